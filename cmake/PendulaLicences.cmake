@@ -5,7 +5,7 @@ include_guard(GLOBAL)
 function(pendula_install_licences destination)
   foreach(part IN ITEMS eigen3:libeigen3-dev xsimd:libxsimd-dev hdf5:libhdf5-dev isa-l:libisal-dev
                         random123:librandom123-dev cli11:libcli11-dev tomlplusplus:libtomlplusplus-dev
-                        nlohmann-json:nlohmann-json3-dev three.js:libjs-three)
+                        nlohmann-json:nlohmann-json3-dev)
     string(REGEX MATCH "^([^:]*):(.*)$" matched "${part}")
     set(name "${CMAKE_MATCH_1}")
     set(file "/usr/share/doc/${CMAKE_MATCH_2}/copyright")

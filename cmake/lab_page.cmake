@@ -7,8 +7,8 @@ cmake_minimum_required(VERSION 3.25)
 include("${CMAKE_CURRENT_LIST_DIR}/embed_bytes.cmake")
 
 # Scripts in the order in which they stand in one module; those of other pages first, which both have.
-set(shared format palette gestures plots shapes)
-set(own vectors spec link history stage hand panels controls main)
+set(shared format palette gestures curves plots shapes view trace light plane space stage)
+set(own vectors spec link history places stage hand panels controls watch looks keys main)
 
 # Sets OUT_TEXT to the files that follow, one after the other.
 function(read_texts out_text)
@@ -48,8 +48,8 @@ endforeach()
 foreach(name IN LISTS own)
   list(APPEND files "${FOLDER}/${name}.js")
 endforeach()
-read_texts(script ${files})
-read_texts(worker "${FOLDER}/vectors.js" "${FOLDER}/engine.js" "${FOLDER}/worker.js")
+read_scripts(script ${files})
+read_scripts(worker "${FOLDER}/vectors.js" "${FOLDER}/algebra.js" "${FOLDER}/engine.js" "${FOLDER}/worker.js")
 file(GLOB files "${FOLDER}/texts/*.json")
 list(SORT files)
 set(texts "")

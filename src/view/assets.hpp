@@ -2,19 +2,16 @@
 
 #include <string_view>
 
-/// The files of src/view/page, and three.js, as the build found them: made by cmake/embed.cmake.
+/// The files of src/view/page, as the build found them: made by cmake/embed.cmake.
 namespace pendula::view::assets {
 
 extern const std::string_view page;           ///< page.html, with {{names}} of what comes in
 extern const std::string_view style;          ///< page.css
 extern const std::string_view script_before;  ///< what any page needs, as one module with the two that follow
-extern const std::string_view script_plane;   ///< class Stage of points in the plane,
-extern const std::string_view script_space;   ///< of points in space,
-extern const std::string_view script_lanes;   ///< and of coordinates without points
+extern const std::string_view script_plane;   ///< what draws points in the plane,
+extern const std::string_view script_space;   ///< points in space,
+extern const std::string_view script_lanes;   ///< and coordinates without points
 extern const std::string_view script_after;
-extern const std::string_view three;          ///< three.js, gzip
-extern const std::string_view three_version;  ///< "111"
-extern const std::string_view three_licence;
 
 extern const std::string_view lab_page;  ///< by cmake/lab_page.cmake, with {{title}} and {{start}}
 

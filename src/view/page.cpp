@@ -309,21 +309,20 @@ json Page::described() const {
           {"lengthUnit", scene_.length_unit},
           {"loaded", scene_.loaded},
           {"laboratory", scene_.laboratory},
-          {"three", assets::three_version},
           {"runs", runs}};
 }
 
 /// What stands for {{name}}.
 std::string Page::part(const std::string& name) const {
-  const bool in_space = scene_.dimension() == 3;
   if (name == "title") return html_text(scene_.title);
   if (name == "version") return html_text(scene_.version);
   if (name == "style") return std::string(assets::style);
   if (name == "scene") return script_json(described());
   if (name == "script") {
-    const std::string_view stage = in_space                  ? assets::script_space
-                                   : scene_.dimension() == 2 ? assets::script_plane
-                                                             : assets::script_lanes;
+    const int dimension = scene_.dimension();
+    const std::string_view stage = dimension == 3   ? assets::script_space
+                                   : dimension == 2 ? assets::script_plane
+                                                    : assets::script_lanes;
     return std::string(assets::script_before) + std::string(stage) + std::string(assets::script_after);
   }
   std::string text;
@@ -333,11 +332,6 @@ std::string Page::part(const std::string& name) const {
     json start = scene_.laboratory_model.empty() ? json::object() : json::parse(scene_.laboratory_model);
     start["title"] = scene_.title;
     text = "<script type=\"application/json\" id=\"laboratory\">" + script_json(lab_page(start)) + "</script>";
-  } else if (name == "three" && in_space) {
-    text += "<!-- three.js r" + std::string(assets::three_version) + "\n\n" + std::string(assets::three_licence) +
-            "-->\n<script type=\"text/plain\" id=\"three\">";
-    append_base64(text, assets::three);
-    text += "</script>";
   }
   return text;
 }

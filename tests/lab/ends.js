@@ -3,7 +3,7 @@ const fs = require("fs");
 
 const [file, folder] = process.argv.slice(2);
 const cases = JSON.parse(fs.readFileSync(0, "utf8"));
-const source = ["vectors.js", "engine.js"].map((name) => fs.readFileSync(`${folder}/${name}`, "utf8")).join("\n");
+const source = ["vectors.js", "algebra.js", "engine.js"].map((name) => fs.readFileSync(`${folder}/${name}`, "utf8")).join("\n");
 const { Engine, startModule } = new Function(`${source}; return { Engine, startModule };`)();
 
 WebAssembly.compile(fs.readFileSync(file)).then(async (module) => {

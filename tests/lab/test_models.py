@@ -323,7 +323,7 @@ def test_copies_of_a_model_part(open_lab):
     """A cart's place has no part in its motion: copies that differ in it alone would stay together."""
     page = open_lab("model=cart_chain&copies=50&apart=1e-6", motion="no-preference")
     until(page, "pendulaLab.copies?.count === 50")
-    copies = "pendulaLab.panels.find((panel) => panel.distances).distances"
+    copies = 'pendulaLab.panels.find((panel) => panel.key === "copies").values'
     until(page, f"{copies}.some(([, far]) => far > 1e-2)")
     page.keyboard.press("Space")
     await_frame(page)

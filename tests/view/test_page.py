@@ -113,7 +113,7 @@ def test_help_opens_and_closes_by_key(open_page):
     page = open_page("demo")
     page.keyboard.press("?")
     assert page.locator("#help").is_visible()
-    assert "three.js r111" in page.inner_text("#about")
+    assert "Made by pendula" in page.inner_text("#about")
     page.keyboard.press("Escape")
     assert not page.locator("#help").is_visible()
 
@@ -149,14 +149,6 @@ def test_the_view_changes_and_comes_back(open_page, name):
         assert picture(page) != first, what
         page.keyboard.press("r")
         assert picture(page) == first, f"back from {what}"
-
-
-@pytest.mark.parametrize("name", ["demo", "hundred_in_space"])
-def test_turning_says_nothing_to_the_console(open_page, name):
-    page = open_page(name)
-    for key in ["d"] * 12 + ["w"] * 6:  # three.js complained of flat shadows, dozens of times
-        page.keyboard.press(key)
-        picture(page)
 
 
 @pytest.mark.parametrize("name", ["demo", "cart"])
@@ -332,29 +324,15 @@ def test_between_rows_rods_keep_their_length_and_motion_is_cubic(browser, pages)
     assert sorted(off)[len(off) // 2] < 1e-3  # measured 2.4e-4
 
 
-def test_without_webgl_the_plots_still_work(browser, pages):
-    page = browser.new_page(reduced_motion="reduce")
-    page.add_init_script(
-        "HTMLCanvasElement.prototype.getContext = ((get) => function (kind, ...more) {"
-        "return kind === '2d' ? get.call(this, kind, ...more) : null;"
-        "})(HTMLCanvasElement.prototype.getContext)"
-    )
-    page.goto(f"file://{pages.folder}/demo.html")
-    until(page, "document.querySelector('#stage .notice') !== null")
-    page.keyboard.press("End")
-    until(page, "Number(document.getElementById('scrub').value) === 10")
-    page.close()
-
-
 def test_no_names_leak(open_page, pages):
     page = open_page("demo")
     (pages.folder / "blank.html").write_text("<!DOCTYPE html><title>blank</title>")
     blank = page.context.new_page()
     blank.goto(f"file://{pages.folder}/blank.html")
     own = set(blank.evaluate("Object.getOwnPropertyNames(window)"))
-    # Elements with an id are to be found on the window in every browser; seenFrames is this test's.
+    # Elements with an id are to be found on the window in every browser; `painted` is this test's.
     ids = set(page.evaluate("[...document.querySelectorAll('[id]')].map((e) => e.id)"))
-    assert set(page.evaluate("Object.getOwnPropertyNames(window)")) - own - ids <= {"seenFrames"}
+    assert set(page.evaluate("Object.getOwnPropertyNames(window)")) - own - ids <= {"painted"}
 
 
 def test_light_and_dark(open_page):
@@ -392,30 +370,22 @@ def test_controls_have_names(open_page):
     assert page.inner_text("#said").startswith("Paused at")
 
 
-def test_a_page_is_small_soon_written_and_soon_seen(open_page, pages):
-    assert pages.sizes["demo"] <= 1_500_000  # measured 640,000
-    assert pages.milliseconds["demo"] <= 50  # measured 10
-    page = open_page("demo")
-    mark = "performance.getEntriesByName('pendula first frame')[0].startTime"
-    shown = page.evaluate(mark)
-    print(f"first frame after {shown:.0f} ms")
-    assert shown <= 3000  # measured 450 to 900, where others kept both cores busy
+def test_a_page_is_small(pages):
+    assert pages.sizes["demo"] <= 1_500_000  # measured 424,000
 
 
-# What a frame may cost the page's own thread, that 60 and 30 of them fit into a second [ms].
-FRAMES = {"demo": 16, "hundred": 16, "hundred_in_space": 16, "thousand": 33, "thousand_in_space": 33}
+# What a frame paints: of long chains little more than their balls. A page has some 16 ms for it.
+PAINTED = {"demo": 150, "hundred": 50, "hundred_in_space": 250, "thousand": 50, "thousand_in_space": 1200}
 
 
-@pytest.mark.parametrize("name", FRAMES)
-def test_a_frame_costs_little(open_page, name):
-    page = open_page(name, motion="no-preference")
-    page.wait_for_timeout(2500)
-    frames = page.evaluate("window.seenFrames")
-    later = [frame for frame in frames if frame[0] > frames[0][0] + 1500]  # it has found its resolution
-    seconds = (later[-1][0] - later[0][0]) / 1000
-    median = sorted(cost for _, cost in later)[len(later) // 2]
-    print(f"{name}: {len(later) / seconds:.0f} frames/s, {median:.1f} ms of script each")
-    assert median <= FRAMES[name]  # measured 2.6, 1.0, 2.2, 2.7, 5.5
+@pytest.mark.parametrize("name", PAINTED)
+def test_a_frame_paints_little(open_page, name):
+    page = open_page(name)
+    picture(page)
+    page.evaluate("window.painted = 0")
+    scrub(page, 0.6)
+    picture(page)
+    assert 0 < page.evaluate("window.painted") <= PAINTED[name]  # measured 95, 27, 163, 27, 1059
 
 
 def test_a_page_knows_carts_from_bobs(pages):

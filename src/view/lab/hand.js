@@ -37,7 +37,11 @@ function posedChain(state, q, bob, place) {
 }
 
 class Hand {
-  constructor() {
+  isPosed = false; // what is shown is where the hand put it, not a motion yet
+  posing = null;
+
+  constructor(lab) {
+    this.lab = lab;
     this.bob = -1;
   }
 
@@ -45,19 +49,54 @@ class Hand {
     return this.bob >= 0;
   }
 
-  take(bob, place) {
-    this.bob = bob;
-    this.wanted = [...place];
-    this.place = [...place];
-    this.speed = [0, 0, 0];
+  /// Whether a point of a model is held that will have the speed of the hand: time waits meanwhile.
+  get throws() {
+    return Boolean(model) && this.isHolding && this.wasPlaying;
+  }
+
+  /// Where it is to be seen.
+  get seen() {
+    return { bob: this.bob, place: this.lab.playing || this.throws ? this.place : this.wanted };
+  }
+
+  take(bob, x, y) {
+    const { lab } = this;
+    const place = Array.from(lab.stage.places.subarray(3 * bob, 3 * bob + 3));
+    Object.assign(this, { bob, wanted: [...place], place: [...place], speed: [0, 0, 0], wasPlaying: lab.playing });
+    this.grip = [place, lab.stage.placeAt(x, y, place)];
+    if (model) lab.play(false);
+    if (lab.shown < lab.history.end - 1e-9 && lab.playing) lab.send(); // from what is shown, not from the end
+    at("hint").classList.add("gone");
+    lab.changed();
+  }
+
+  /// The next one, or the last.
+  takeNext() {
+    const { count } = this.lab.stage;
+    this.take(this.isHolding ? (this.bob + count - 1) % count : count - 1, 0, 0);
+    say(text("said.taken", { k: this.bob + 1 }));
   }
 
   letGo() {
     this.bob = -1;
   }
 
+  drag(x, y) {
+    if (!this.isHolding) return;
+    const [first, begin] = this.grip;
+    const now = this.lab.stage.placeAt(x, y, first);
+    this.moveTo(now.map((c, axis) => first[axis] + c - begin[axis]));
+  }
+
+  moveTo(place) {
+    this.wanted = place;
+    if (!this.lab.playing && !this.throws) this.#pose(place);
+    this.lab.changed();
+  }
+
   /// Goes where it is wanted, without jerks: critically damped, within a few hundredths of a second.
   move(passed) {
+    if (!this.isHolding || !(this.lab.playing || this.throws)) return;
     const rate = 40;
     const parts = Math.max(1, Math.ceil(passed / 0.004));
     const h = passed / parts;
@@ -68,6 +107,7 @@ class Hand {
         this.place[axis] += h * this.speed[axis];
       }
     }
+    if (this.throws) this.#pose(this.place);
   }
 
   /// What the engine is told: components of the chain's space.
@@ -76,69 +116,86 @@ class Hand {
     const of = ([x, y, z]) => (space === 2 ? [x, z] : [x, y, z]);
     return { bob: this.bob, place: of(this.place), speed: of(this.speed) };
   }
-}
 
-/// Pointers on the stage: of a bob the hand's, of a ruler's end, otherwise the view's. `before()`: places of some moments ago.
-function watchStage(stage, { take, drag, drop, changed, before }) {
-  const { canvas } = stage;
-  const fingers = new Map();
-  let holder = null; // the pointer that holds something
-  let ruler = null;
-  const place = (event) => [event.offsetX, event.offsetY];
-
-  canvas.addEventListener("pointerdown", (event) => {
-    const [x, y] = place(event);
-    try {
-      canvas.setPointerCapture(event.pointerId);
-    } catch {
-      // a pointer that is gone
-    }
-    fingers.set(event.pointerId, [x, y]);
-    if (holder !== null || event.button > 0 || event.shiftKey || fingers.size > 1) return;
-    ruler = document.documentElement.dataset.ruler ? stage.rulerAt(x, y) ?? null : null;
-    const bob = ruler ? -1 : stage.pointAt(x, y, event.pointerType === "touch" ? 40 : 26, before());
-    if (!ruler && bob < 0) return;
-    holder = event.pointerId;
-    if (bob >= 0) take(bob, x, y);
-    canvas.classList.toggle("held", bob >= 0);
-  });
-  canvas.addEventListener("pointermove", (event) => {
-    const [x, y] = place(event);
-    const last = fingers.get(event.pointerId);
-    if (!last) {
-      canvas.classList.toggle("near", event.pointerType === "mouse" && stage.pointAt(x, y) >= 0);
+  // At rest, and where the hand is.
+  #pose(place) {
+    const { state, row, size } = this.lab;
+    if (model) {
+      this.posing ??= this.#poseModel(this.bob, place).finally(() => (this.posing = null));
       return;
     }
-    if (holder === event.pointerId) {
-      if (ruler) stage.moveRuler(ruler, x, y);
-      else drag(x, y);
-    } else if (fingers.size === 2) {
-      const other = [...fingers].find(([id]) => id !== event.pointerId)[1];
-      const spread = (p) => Math.hypot(p[0] - other[0], p[1] - other[1]);
-      if (spread(last) > 0) stage.zoom(spread([x, y]) / spread(last));
-    } else if (holder === null) {
-      const turns = stage.space === 3 && !event.shiftKey && !(event.buttons & 6);
-      stage[turns ? "turn" : "move"](x - last[0], y - last[1]);
-    }
-    fingers.set(event.pointerId, [x, y]);
-    changed();
-  });
-  for (const ended of ["pointerup", "pointercancel", "lostpointercapture"]) {
-    canvas.addEventListener(ended, (event) => {
-      fingers.delete(event.pointerId);
-      if (holder !== event.pointerId) return;
-      holder = null;
-      canvas.classList.remove("held");
-      if (!ruler) drop();
-      ruler = null;
-      changed();
-    });
+    row.set(posedChain(state, row.subarray(1, 1 + size), this.bob, place), 1);
+    row.fill(0, 1 + size, 1 + 2 * size);
+    this.isPosed = true;
+    this.lab.changed();
   }
-  canvas.addEventListener("contextmenu", (event) => event.preventDefault());
-  canvas.addEventListener("wheel", (event) => {
-    event.preventDefault();
-    const pixels = event.deltaY * (event.deltaMode === 1 ? 16 : 1);
-    stage.zoom(Math.exp(-clamp(pixels, -200, 200) * 0.0016));
-    changed();
-  }, { passive: false });
+  async #poseModel(bob, place, speed = [0, 0, 0]) {
+    const { lab } = this;
+    const { size, order } = lab;
+    const first = model.points.slice(0, bob).reduce((sum, each) => sum + each.columns.length, 0);
+    const of = ([x, y, z]) => (model.points[bob].columns.length === 2 ? [x, z] : [x, y, z]);
+    const asked = { q: lab.row.slice(1, 1 + size), time: lab.state.t, first, place: of(place), speed: of(speed) };
+    const answer = await lab.computer.ask("pose", asked).catch(() => null);
+    if (!answer || order !== lab.order) return;
+    lab.row.set(answer.q, 1);
+    lab.row.set(answer.v, 1 + size);
+    lab.row.set(answer.points, 3 + 2 * size);
+    lab.row.set(answer.rates, 3 + 2 * size + pointColumns);
+    this.isPosed = true;
+    lab.changed();
+  }
+
+  async drop() {
+    const { lab, throws, bob } = this;
+    const { order } = lab;
+    if (!this.isHolding) return;
+    this.letGo();
+    if (model) {
+      await this.posing;
+      if (throws) await this.#poseModel(bob, this.place, this.speed);
+      else if (this.isPosed) await this.#poseModel(bob, this.wanted); // where the hand was last
+      if (order !== lab.order || this.isHolding) return;
+    }
+    if (this.isPosed) {
+      this.isPosed = false;
+      lab.startsAt(lab.row);
+      lab.restart();
+      lab.play(model ? this.wasPlaying : false);
+      lab.controls.refresh();
+    } else if (lab.playing) {
+      // What follows is a motion of its own, from here on.
+      const { rows, rowSize, numbers } = lab.history;
+      const last = numbers.subarray((rows - 1) * rowSize, rows * rowSize);
+      lab.startsAt(last);
+      if (isDriven(lab.state)) [lab.state.t] = last; // what drives it does not begin again
+      lab.controls.refresh();
+      lab.looks.writeLink();
+    }
+    say(text("said.dropped"));
+    lab.changed();
+  }
+}
+
+/// What pointers take on the stage: a ball, or an end of the ruler.
+function watchHand(lab) {
+  const { stage, hand } = lab;
+  const { classList } = stage.canvas;
+  let ruler = null;
+  watchGestures(stage, {
+    changed: () => lab.changed(),
+    take(event, x, y) {
+      ruler = (document.documentElement.dataset.ruler && stage.rulerAt(x, y)) || null;
+      const bob = ruler ? -1 : stage.pointAt(x, y, event.pointerType === "touch" ? 40 : 26, lab.placesBefore());
+      if (bob >= 0) hand.take(bob, x, y);
+      classList.toggle("held", bob >= 0);
+      return ruler !== null || bob >= 0;
+    },
+    drag: (x, y) => (ruler ? stage.moveRuler(ruler, x, y) : hand.drag(x, y)),
+    drop() {
+      classList.remove("held");
+      if (!ruler) hand.drop();
+      ruler = null;
+    },
+    pass: (event, x, y) => classList.toggle("near", event.pointerType === "mouse" && stage.pointAt(x, y) >= 0),
+  });
 }

@@ -66,14 +66,7 @@ class History {
 
   /// The last row that is not later than a time.
   rowAt(time) {
-    let low = 0;
-    let high = this.rows - 1;
-    while (low < high) {
-      const middle = (low + high + 1) >> 1;
-      if (this.time(middle) <= time + 1e-12) low = middle;
-      else high = middle - 1;
-    }
-    return low;
+    return lastBy(time + 1e-12, this.rows, (row) => this.time(row));
   }
 
   /// The row at a time, between two rows by a cubic through coordinates and rates; into `out`.

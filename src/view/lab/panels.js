@@ -2,16 +2,11 @@
 
 const windowOfTime = 20; // s that panels over time show
 
-/// A titled box: options, a place for a plot, a key to its curves.
+/// A panel for a level, whose title is a text.
 function labPanel(key, level, options = [], kind = "") {
-  const plot = element("div", { className: "plot" });
-  const keys = element("div", { className: "keys" });
-  const heading = element("h2");
-  heading.dataset.text = key;
-  const head = element("header", {}, heading, element("div", { className: "options" }, ...options));
-  const section = element("section", { className: `panel ${level} ${kind}` }, head, plot, keys);
-  at("panels").append(section);
-  return { section, plot, keys, level, axes: new Axes(plot, text(key)) };
+  const box = panel(text(key), options, `${level} ${kind}`);
+  box.heading.dataset.text = key;
+  return { ...box, level, axes: new Axes(box.plot, text(key)) };
 }
 
 /// A list of names to choose from.
@@ -61,11 +56,7 @@ class Panel {
     const all = curves.map(([colour, words]) => `${colour}${words}`).join();
     if (all === this.named) return;
     this.named = all;
-    this.box.keys.replaceChildren(...curves.map(([colour, words]) => {
-      const mark = element("i");
-      if (colour) mark.style.background = colour;
-      return element("span", {}, ...(colour ? [mark] : []), words);
-    }));
+    nameCurves(this.box.keys, curves.filter(([colour]) => colour), ...curves.filter(([colour]) => !colour).map(([, words]) => words));
   }
 
   /// Rows of the window up to the time that is shown: from, to, and the stride that leaves few enough.
@@ -81,32 +72,14 @@ class Panel {
     const { shown, history } = this.lab;
     const high = Math.max(shown, history.start + windowOfTime);
     this.axes.x = { low: high - windowOfTime, high };
-    return niceTicks(this.axes.x.low, high, this.axes.mostTicks).map((t) => ({ at: t, text: readable(t, 6) }));
+    return linearTicks(this.axes.x, this.axes.mostTicks);
   }
 
-  /// A line, or where it would go up and down too fast to be seen the band that it stays in, and its mean.
+  /// Over the window.
   curve(pen, colour, value, width = 1.5) {
-    const { from, to, stride } = this.rows(2400);
-    const points = [];
-    for (let row = from; row <= to; row += stride) {
-      const y = value(row);
-      if (Number.isFinite(y)) points.push([this.axes.atX(this.lab.history.time(row)), this.axes.atY(y)]);
-      else if (points.length) points.length = 0; // what is not known is before what is
-    }
-    const band = bandOf(points);
-    pen.strokeStyle = pen.fillStyle = colour;
-    if (band.length) {
-      pen.globalAlpha = 0.3;
-      pen.beginPath();
-      for (const { x, low } of band) pen.lineTo(x, low);
-      for (const { x, high } of band.slice().reverse()) pen.lineTo(x, high);
-      pen.fill();
-      pen.globalAlpha = 1;
-    }
+    pen.strokeStyle = colour;
     pen.lineWidth = width;
-    pen.beginPath();
-    for (const [x, y] of band.length ? band.map(({ x, mean }) => [x, mean]) : points) pen.lineTo(x, y);
-    pen.stroke();
+    drawCurve(pen, this.axes, this.rows(2400), (row) => this.lab.history.time(row), value, { isOverTime: true });
   }
 
   /// `scale`: with what rounding of the values compares.
@@ -122,25 +95,6 @@ class Panel {
     }
     return low <= high ? rangeOf([[low, high]], undefined, scale) : { low: 0, high: 1 };
   }
-}
-
-const closest = 4; // pixels from one turn of a line to the one after the next that are told apart
-
-/// The envelope of a line that goes up and down faster than that: {x, low, high, mean} in pixels; else nothing.
-function bandOf(points) {
-  let turns = 0;
-  for (let k = 2; k < points.length; ++k) {
-    if ((points[k][1] - points[k - 1][1]) * (points[k - 1][1] - points[k - 2][1]) < 0) ++turns;
-  }
-  const width = points.length ? points.at(-1)[0] - points[0][0] : 0;
-  if (turns < 8 || (2 * width) / turns > closest) return [];
-  const band = [];
-  for (const [x, y] of points) {
-    const last = band.at(-1);
-    if (!last || x >= last.begin + closest) band.push({ begin: x, x, low: y, high: y, sum: y, count: 1 });
-    else Object.assign(last, { low: Math.max(last.low, y), high: Math.min(last.high, y), sum: last.sum + y, count: last.count + 1, x: (last.begin + x) / 2 });
-  }
-  return band.map(({ x, low, high, sum, count }) => ({ x, low, high, mean: sum / count }));
 }
 
 /// Kinetic, potential and total energy.
@@ -162,7 +116,7 @@ class EnergyPanel extends Panel {
     const colours = [1, 0, 5].map((k) => rgba(palette.curves[k]));
     values.forEach((value, k) => this.curve(pen, colours[k], value, k === 2 ? 2.2 : 1.6));
     pen.restore();
-    const now = [lab.row[kinetic], lab.row[potential], lab.row[kinetic] + lab.row[potential]].map((x) => `${x.toFixed(2).replace("-", "−")} J`);
+    const now = [lab.row[kinetic], lab.row[potential], lab.row[kinetic] + lab.row[potential]].map((x) => `${steady(x)} J`);
     const names = ["kinetic", "potential", "total"].map((key, k) => `${text(key)} ${now[k]}`);
     this.name(...names.map((name, k) => [colours[k], name]));
     this.describe(`${text("panel.energy")}: ${names.join(", ")}`);
@@ -194,7 +148,7 @@ class InputsPanel extends Panel {
     axes.drawGrid(pen, this.timeAxis(), linearTicks(axes.y, axes.height / 30, false, 3), "s");
     acting.forEach((k, place) => this.curve(pen, rgba(palette.curves[place]), since(k)));
     pen.restore();
-    const names = acting.map((k) => `${symbol(inputs[k].name)} ${value(k, lab.shown).toFixed(2).replace("-", "−")} ${unitWords(inputs[k].unit)}`);
+    const names = acting.map((k) => `${symbol(inputs[k].name)} ${steady(value(k, lab.shown))} ${unitWords(inputs[k].unit)}`);
     this.name(...names.map((name, place) => [rgba(palette.curves[place]), name]));
     this.describe(`${text("panel.inputs")}: ${names.join(", ")}`);
   }
@@ -219,10 +173,7 @@ class ErrorPanel extends Panel {
     axes.beginMoving();
     const { low, high } = this.range([value]);
     axes.y = { low: Math.min(Math.floor(low), -16), high: Math.max(Math.ceil(high), -12) };
-    const ticks = [];
-    const step = Math.max(1, Math.ceil((axes.y.high - axes.y.low) / 5));
-    for (let k = axes.y.low; k <= axes.y.high; k += step) ticks.push({ at: k, text: powerOfTen(k) });
-    axes.drawGrid(pen, this.timeAxis(), ticks, "s");
+    axes.drawGrid(pen, this.timeAxis(), powerTicks(axes.y.low, axes.y.high, 5), "s");
     this.curve(pen, palette.css("accent"), value);
     pen.restore();
     const off = Math.abs(lab.row[1 + 2 * size] + lab.row[2 + 2 * size] - lab.energy) / scale;
@@ -261,14 +212,7 @@ class PhasePanel extends Panel {
       const [begin, end] = [piece, piece + 1].map((p) => from + stride * Math.floor(((to - from) / stride) * (p / pieces)));
       pen.strokeStyle = rgba(palette.curves[0], 0.15 + (0.85 * (piece + 1)) / pieces);
       pen.lineWidth = 1.3;
-      pen.beginPath();
-      let before = NaN;
-      for (let row = begin; row <= Math.min(end, to); row += stride) {
-        const x = place(row);
-        pen[Number.isNaN(before) || (wrapped && Math.abs(x - before) > Math.PI) ? "moveTo" : "lineTo"](axes.atX(x), axes.atY(rate(row)));
-        before = x;
-      }
-      pen.stroke();
+      drawCurve(pen, axes, { from: begin, to: Math.min(end, to), stride }, place, rate, { wrapped: wrapped ? 0 : -1 });
     }
     const now = lab.row[1 + k];
     dot(pen, axes.atX(wrapped ? wrap(now) : now), axes.atY(lab.row[1 + size + k]), palette.rgb.trace, 4);
@@ -284,7 +228,7 @@ const turnOfAngles = { low: -1.06 * Math.PI, high: 1.06 * Math.PI };
 /// Angles in degrees, other numbers as they are.
 function degreeTicks(axis, count, wrapped) {
   if (!wrapped) return linearTicks(axis, count, false);
-  return [-180, -90, 0, 90, 180].map((k) => ({ at: (k * Math.PI) / 180, text: `${k}°`.replace("-", "−") }));
+  return [-180, -90, 0, 90, 180].map((k) => ({ at: (k * Math.PI) / 180, text: `${steady(k, 0)}°` }));
 }
 
 /// Where the first coordinate goes through zero upwards: the last one and its rate.
@@ -341,97 +285,101 @@ class SectionPanel extends Panel {
   }
 }
 
-/// Copies that start beside the motion, and how far they get from it.
-class CopiesPanel extends Panel {
-  constructor(lab) {
-    const button = element("button", { type: "button", id: "copies" });
-    const apart = picker("copies.apart", () => lab.setCopies(lab.state.copies, 10 ** -Number(apart.value)));
-    for (const power of [3, 6, 9, 12]) apart.append(element("option", { value: power, textContent: `${powerOfTen(-power)}${model ? "" : " rad"}`, selected: power === 6 }));
-    super(lab, labPanel("panel.copies", "student", [apart, button]));
-    button.addEventListener("click", () => lab.setCopies(lab.state.copies ? 0 : 50, 10 ** -Number(apart.value)));
-    Object.assign(this, { button, key: "copies" });
-    this.distances = [];
-  }
+/// What runs beside the motion for as long as one wants: a number that grows with time, [time, number] each.
+class RunningPanel extends Panel {
+  values = [];
 
-  begin() {
-    this.distances = [];
-    this.run(this.lab.state.copies > 0);
-  }
-
-  add(time, distance) {
-    if (!this.distances.length || time > this.distances.at(-1)[0] + 0.05) this.distances.push([time, distance]);
-    if (this.distances.length > 4000) this.distances = this.distances.filter((_, k) => k % 2 === 0);
-  }
-
-  draw() {
-    const { lab, axes, distances } = this;
-    this.box.section.classList.toggle("off", lab.state.copies === 0);
-    this.box.plot.hidden = lab.state.copies === 0;
-    if (lab.state.copies === 0) {
-      this.name(["", text("copies.key")]);
-      return;
-    }
-    const pen = axes.begin();
-    axes.beginMoving();
-    const times = distances.map(([time]) => time);
-    axes.x = { low: times[0] ?? 0, high: Math.max(times.at(-1) ?? 0, (times[0] ?? 0) + 10) };
-    const logs = distances.map(([, distance]) => Math.log10(Math.max(distance, 1e-16)));
-    axes.y = { low: Math.min(-6, Math.floor(Math.min(...logs, 0))), high: 1 };
-    const ticks = [];
-    const step = Math.max(1, Math.ceil((axes.y.high - axes.y.low) / 5));
-    for (let k = axes.y.low; k <= axes.y.high; k += step) ticks.push({ at: k, text: powerOfTen(k) });
-    axes.drawGrid(pen, niceTicks(axes.x.low, axes.x.high, axes.mostTicks).map((t) => ({ at: t, text: readable(t, 6) })), ticks, "s");
-    pen.strokeStyle = palette.css("trace");
-    pen.lineWidth = 1.6;
-    pen.beginPath();
-    distances.forEach(([time], k) => pen.lineTo(axes.atX(time), axes.atY(logs[k])));
-    pen.stroke();
-    pen.restore();
-    this.name(["", text(lab.isAngle.every(Boolean) ? "copies.distance" : "copies.distance.any", { count: lab.state.copies })]);
-  }
-}
-
-/// The leading Lyapunov exponent, as it converges.
-class ExponentPanel extends Panel {
-  constructor(lab) {
-    const button = element("button", { type: "button", id: "measure" });
-    super(lab, labPanel("panel.exponent", "all", [button]));
-    Object.assign(this, { button, key: "exponent" });
-    button.addEventListener("click", () => lab.measure(!lab.isMeasuring));
-    this.values = [];
+  constructor(lab, key, level, options = []) {
+    const button = element("button", { type: "button" });
+    super(lab, labPanel(`panel.${key}`, level, [...options, button]));
+    Object.assign(this, { button, key });
   }
 
   begin() {
     this.values = [];
-    this.run(this.lab.isMeasuring);
+    this.run(this.isOn);
   }
 
   add(time, value) {
-    if (this.values.at(-1)?.[0] === time) return;
+    if (this.values.length && time <= this.values.at(-1)[0] + this.apart) return;
     this.values.push([time, value]);
     if (this.values.length > 4000) this.values = this.values.filter((_, k) => k % 2 === 0);
   }
 
   draw() {
-    const { lab, axes, values } = this;
-    this.box.section.classList.toggle("off", !lab.isMeasuring);
-    this.box.plot.hidden = !lab.isMeasuring;
-    if (!lab.isMeasuring) {
-      this.name(["", text("exponent.key")]);
-      return;
-    }
+    const { axes, values, box } = this;
+    box.section.classList.toggle("off", !this.isOn);
+    box.plot.hidden = !this.isOn;
+    this.name(["", this.isOn ? this.words : text(`${this.key}.key`)]);
+    if (!this.isOn) return;
     const pen = axes.begin();
     axes.beginMoving();
-    axes.x = { low: values[0]?.[0] ?? 0, high: Math.max(values.at(-1)?.[0] ?? 0, (values[0]?.[0] ?? 0) + 10) };
-    const range = rangeOf([values.map(([, value]) => value)]);
-    axes.y = { low: Math.min(0, range.low), high: range.high };
-    axes.drawGrid(pen, niceTicks(axes.x.low, axes.x.high, axes.mostTicks).map((t) => ({ at: t, text: readable(t, 6) })), linearTicks(axes.y, axes.height / 30, false, 3), "s");
-    pen.strokeStyle = rgba(palette.curves[3]);
-    pen.lineWidth = 1.8;
-    pen.beginPath();
-    values.forEach(([time, value]) => pen.lineTo(axes.atX(time), axes.atY(value)));
-    pen.stroke();
+    const first = values[0]?.[0] ?? 0;
+    axes.x = { low: first, high: Math.max(values.at(-1)?.[0] ?? 0, first + 10) };
+    axes.drawGrid(pen, linearTicks(axes.x, axes.mostTicks), this.upright(), "s");
+    pen.strokeStyle = this.colour;
+    pen.lineWidth = 1.7;
+    drawCurve(pen, axes, { from: 0, to: values.length - 1 }, (k) => values[k][0], (k) => this.height(values[k][1]));
     pen.restore();
-    this.name(["", text("exponent.now", { value: values.length ? readable(values.at(-1)[1], 3) : "–" })]);
+  }
+}
+
+/// Copies that start beside the motion, and how far they get from it.
+class CopiesPanel extends RunningPanel {
+  apart = 0.05;
+
+  constructor(lab) {
+    const apart = picker("copies.apart", () => lab.setCopies(lab.state.copies, 10 ** -Number(apart.value)));
+    for (const power of [3, 6, 9, 12]) apart.append(element("option", { value: power, textContent: `${powerOfTen(-power)}${model ? "" : " rad"}`, selected: power === 6 }));
+    super(lab, "copies", "student", [apart]);
+    this.button.addEventListener("click", () => lab.setCopies(lab.state.copies ? 0 : 50, 10 ** -Number(apart.value)));
+  }
+
+  get isOn() {
+    return this.lab.state.copies > 0;
+  }
+  get colour() {
+    return palette.css("trace");
+  }
+  get words() {
+    return text(this.lab.isAngle.every(Boolean) ? "copies.distance" : "copies.distance.any", { count: this.lab.state.copies });
+  }
+
+  height(distance) {
+    return Math.log10(Math.max(distance, 1e-16));
+  }
+  upright() {
+    const least = Math.min(...this.values.map(([, distance]) => this.height(distance)), 0);
+    this.axes.y = { low: Math.min(-6, Math.floor(least)), high: 1 };
+    return powerTicks(this.axes.y.low, 1, 5);
+  }
+}
+
+/// The leading Lyapunov exponent, as it converges.
+class ExponentPanel extends RunningPanel {
+  apart = 0;
+
+  constructor(lab) {
+    super(lab, "exponent", "all");
+    this.button.addEventListener("click", () => lab.measure(!lab.isMeasuring));
+  }
+
+  get isOn() {
+    return this.lab.isMeasuring;
+  }
+  get colour() {
+    return rgba(palette.curves[3]);
+  }
+  get words() {
+    return text("exponent.now", { value: this.values.length ? readable(this.values.at(-1)[1], 3) : "–" });
+  }
+
+  height(value) {
+    return value;
+  }
+  upright() {
+    const range = rangeOf([this.values.map(([, value]) => value)]);
+    this.axes.y = { low: Math.min(0, range.low), high: range.high };
+    return linearTicks(this.axes.y, this.axes.height / 30, false, 3);
   }
 }

@@ -56,10 +56,6 @@ function isDriven(state) {
   return state.u.some((each) => each !== 0) || actingSines(state).length > 0;
 }
 
-function clamp(x, low, high) {
-  return Math.min(Math.max(x, low), high);
-}
-
 /// The state that a link tells; what it does not tell, or tells wrongly, is as at first.
 function stateOf(words) {
   const state = freshState();

@@ -31,7 +31,7 @@ class Controls {
   showTime() {
     const { player } = this;
     const digits = Math.min(Math.max(3 - Math.floor(Math.log10(player.duration || 1)), 0), 12);
-    const text = `${player.time.toFixed(digits)} ${scene.timeUnit}`;
+    const text = `${steady(player.time, digits)} ${scene.timeUnit}`;
     at("clock").textContent = text;
     at("time").textContent = text;
     const scrub = at("scrub");
@@ -99,8 +99,7 @@ class Controls {
     at("copy-csv").addEventListener("click", (event) => copy(this.#run().csv(), event.currentTarget));
     at("save-csv").addEventListener("click", () => save(this.#run().csv(), csvName()));
     at("copy-scenario").addEventListener("click", (event) => copy(scene.scenario, event.currentTarget));
-    const three = scene.dimension === 3 ? ` Drawn by three.js r${scene.three} (MIT licence, in the source of this page).` : "";
-    at("about").textContent = `Made by pendula ${scene.version}.${three} Between rows, motion is cubic in time; rods keep their length.`;
+    at("about").textContent = `Made by pendula ${scene.version}. Between rows, motion is cubic in time; rods keep their length.`;
     this.#showHonesty();
   }
 
@@ -130,7 +129,7 @@ class Controls {
 
   #actions() {
     const { player, stage, marks } = this;
-    const turn = (x, y) => (shift) => (shift ? stage.move(x, y) : stage.turn(x, y));
+    const steer = (x, y) => (shift) => stage.steer(x, y, shift);
     return {
       " ": () => this.#togglePlay(),
       ArrowLeft: (shift) => player.step(shift ? -10 : -1),
@@ -145,10 +144,10 @@ class Controls {
       l: () => player.set("loop", !player.loop),
       r: () => stage.reset(),
       t: () => this.#switchTheme(),
-      a: turn(-1, 0),
-      d: turn(1, 0),
-      w: turn(0, 1),
-      s: turn(0, -1),
+      a: steer(-1, 0),
+      d: steer(1, 0),
+      w: steer(0, 1),
+      s: steer(0, -1),
       q: () => stage.zoom(1 / 1.15),
       e: () => stage.zoom(1.15),
       "?": () => at("help").showModal(),

@@ -40,14 +40,7 @@ class Run {
 
   /// The last row that is not later than a time.
   rowAt(time) {
-    let low = 0;
-    let high = this.rows - 1;
-    while (low < high) {
-      const middle = (low + high + 1) >> 1;
-      if (this.t[middle] <= time) low = middle;
-      else high = middle - 1;
-    }
-    return low;
+    return lastBy(time, this.rows, (row) => this.t[row]);
   }
 
   /// The rows as text, those columns that the page has: all 17 digits of doubles, the 9 that tell a float.

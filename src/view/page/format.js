@@ -1,4 +1,4 @@
-// Numbers and small pieces of text, as people and as programs read them.
+// Numbers and small pieces of text, as people and as programs read them, and what finds them.
 
 /// A number with 17 significant digits, from which the same double is read back: written as C's %.17g writes it.
 function exactNumber(x) {
@@ -22,6 +22,11 @@ function readable(x, digits = 4) {
   const size = Math.abs(x);
   const text = size >= 1e5 || size < 1e-3 ? trimmedExponential(x, digits) : String(Number(x.toPrecision(digits)));
   return text.replaceAll("-", "−");
+}
+
+/// A number that changes while it is read: always as many digits after the point.
+function steady(x, digits = 2) {
+  return x.toFixed(digits).replace("-", "−");
 }
 
 function trimmedExponential(x, digits) {
@@ -74,6 +79,18 @@ function niceTicks(low, high, count, least = 0) {
   };
   const ticks = of(steps[coarse] * power);
   return ticks.length < least ? of(steps[coarse - 1] * power) : ticks;
+}
+
+/// The last of `count` in the order of their times that is not later than a time, the first where all are.
+function lastBy(time, count, timeOf) {
+  let low = 0;
+  let high = count - 1;
+  while (low < high) {
+    const middle = (low + high + 1) >> 1;
+    if (timeOf(middle) <= time) low = middle;
+    else high = middle - 1;
+  }
+  return low;
 }
 
 /// An element with properties and children.

@@ -1,63 +1,64 @@
-// Mouse and touch on a canvas, as turning, moving and zooming.
+// Mouse and touch on a stage: what they take hold of, and turning, moving and zooming.
 
-/// Calls turn(dx, dy) and move(dx, dy) in pixels, zoom(factor, x, y) about a place of the canvas. Where turn is missing,
-/// dragging moves.
-function watchGestures(canvas, { turn, move, zoom }) {
+/// `take(event, x, y)` says whether a pointer holds something there: it is told of each `drag(x, y)`, and `drop()`; all others
+/// change the view, and `changed()` is called. `pass(event, x, y)` is told of pointers that press nothing.
+function watchGestures(stage, { changed, take = () => false, drag, drop, pass = () => {} }) {
+  const { canvas } = stage;
   const fingers = new Map();
-  let spread = null;
-  let middle = null;
+  let holder = null;
 
-  const place = (event) => ({ x: event.offsetX, y: event.offsetY });
-  const measure = () => {
-    const [a, b] = [...fingers.values()];
-    spread = b ? Math.hypot(a.x - b.x, a.y - b.y) : null;
-    middle = b ? { x: (a.x + b.x) / 2, y: (a.y + b.y) / 2 } : null;
+  const place = (event) => [event.offsetX, event.offsetY];
+  const pair = () => {
+    const [[ax, ay], [bx, by]] = fingers.values();
+    return { spread: Math.hypot(ax - bx, ay - by), middle: [(ax + bx) / 2, (ay + by) / 2] };
   };
-  const pinch = () => {
-    const before = { spread, middle };
-    measure();
-    if (before.spread > 0 && spread > 0) zoom(spread / before.spread, middle.x, middle.y);
-    move(middle.x - before.middle.x, middle.y - before.middle.y);
+  const pinch = (before) => {
+    const { spread, middle } = pair();
+    if (before.spread > 0 && spread > 0) stage.zoom(spread / before.spread, ...middle);
+    stage.move(middle[0] - before.middle[0], middle[1] - before.middle[1]);
   };
 
   canvas.addEventListener("pointerdown", (event) => {
-    canvas.setPointerCapture(event.pointerId);
+    try {
+      canvas.setPointerCapture(event.pointerId);
+    } catch {
+      // a pointer that is gone
+    }
     fingers.set(event.pointerId, place(event));
-    measure();
+    const isPlain = event.button <= 0 && !event.shiftKey && fingers.size === 1;
+    if (holder === null && isPlain && take(event, ...place(event))) holder = event.pointerId;
   });
   canvas.addEventListener("pointermove", (event) => {
-    const before = fingers.get(event.pointerId);
-    if (!before) return;
     const now = place(event);
-    fingers.set(event.pointerId, now);
-    if (fingers.size > 1) {
-      pinch();
+    const last = fingers.get(event.pointerId);
+    if (!last) {
+      pass(event, ...now);
       return;
     }
-    const drag = turn && !event.shiftKey && !(event.buttons & 6) ? turn : move;
-    drag(now.x - before.x, now.y - before.y);
+    const before = fingers.size > 1 ? pair() : null;
+    fingers.set(event.pointerId, now);
+    const turns = stage.space === 3 && !event.shiftKey && !(event.buttons & 6);
+    if (holder === event.pointerId) drag(...now);
+    else if (before) pinch(before);
+    else stage[turns ? "turn" : "move"](now[0] - last[0], now[1] - last[1]);
+    changed();
   });
-  for (const ended of ["pointerup", "pointercancel"]) {
+  for (const ended of ["pointerup", "pointercancel", "lostpointercapture"]) {
     canvas.addEventListener(ended, (event) => {
       fingers.delete(event.pointerId);
-      measure();
+      if (holder !== event.pointerId) return;
+      holder = null;
+      drop();
+      changed();
     });
   }
   canvas.addEventListener("contextmenu", (event) => event.preventDefault());
   canvas.addEventListener("wheel", (event) => {
     event.preventDefault();
     const pixels = event.deltaY * (event.deltaMode === 1 ? 16 : 1);
-    zoom(Math.exp(-Math.min(Math.max(pixels, -200), 200) * 0.0016), event.offsetX, event.offsetY);
+    stage.zoom(Math.exp(-clamp(pixels, -200, 200) * 0.0016), event.offsetX, event.offsetY);
+    changed();
   }, { passive: false });
-}
-
-/// Takes the size of a stage's canvas: `width`, `height` in pixels of CSS, `fine` of the screen's to one of them.
-function fitStage(stage) {
-  const { clientWidth: width, clientHeight: height } = stage.canvas;
-  fitCanvas(stage.canvas, width, height);
-  stage.width = width;
-  stage.height = height;
-  stage.fine = stage.canvas.width / Math.max(width, 1);
 }
 
 /// Makes a canvas as fine as the screen, at most two pixels to one of CSS; says whether that changed anything.

@@ -1,6 +1,6 @@
 // The stage of systems without points: their coordinates, each in a lane of its own, as far as time has come.
 
-class Stage {
+class Lanes {
   constructor(host) {
     this.canvas = host.appendChild(element("canvas", { tabIndex: 0, className: "still" }));
     this.pen = this.canvas.getContext("2d");
@@ -11,21 +11,16 @@ class Stage {
     this.onChange = () => {};
   }
 
-  static kind = "lanes";
-
   get description() {
     return `${scene.subject}, which has no points: its coordinates over time. Plots of the same motion follow.`;
   }
 
   reset() {}
   zoom() {}
-  turn() {}
-  move() {}
-  themed() {}
-  pace() {}
+  steer() {}
 
   resize() {
-    fitStage(this);
+    View.prototype.resize.call(this);
     this.onChange();
   }
 

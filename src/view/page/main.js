@@ -1,22 +1,5 @@
 // Puts the parts together.
 
-/// A stage for browsers that cannot draw in space: the plots still work.
-function emptyStage(host, error) {
-  host.querySelector("canvas")?.remove();
-  host.append(element("p", { className: "notice", textContent: `This browser cannot draw in space: ${error.message}` }));
-  const nothing = () => {};
-  const canvas = element("canvas");
-  return { canvas, description: "", onChange: nothing, reset: nothing, zoom: nothing, turn: nothing, move: nothing, resize: nothing, themed: nothing, pace: nothing, draw: nothing };
-}
-
-function makeStage(host) {
-  try {
-    return new Stage(host, new Motion());
-  } catch (error) {
-    return emptyStage(host, error);
-  }
-}
-
 /// What the page is about, and how much of it is here.
 function describePage() {
   const rows = (run) => (run.stride > 1 ? `every ${ordinal(run.stride)} of ${run.seen} rows` : `${run.rows} ${run.rows === 1 ? "row" : "rows"}`);
@@ -50,11 +33,11 @@ function watchSizes(stage, host, panels) {
 function start() {
   const host = at("stage");
   const player = new Player();
-  const stage = makeStage(host);
+  const stage = scene.dimension ? new Theatre(host, new Motion()) : new Lanes(host);
   stage.canvas.setAttribute("role", "img");
   stage.canvas.setAttribute("aria-label", stage.description);
-  document.documentElement.dataset.stage = Stage.kind;
-  if (Stage.kind === "lanes") document.querySelector(".corner").hidden = true;
+  document.documentElement.dataset.stage = { 0: "lanes", 2: "plane", 3: "space" }[scene.dimension];
+  if (!scene.dimension) document.querySelector(".corner").hidden = true;
   const panels = makePanels(player);
   document.documentElement.dataset.panels = panels.length;
   let isDue = true;
@@ -62,26 +45,19 @@ function start() {
   const marks = new Marks(player);
   const controls = new Controls(player, stage, marks, () => {
     palette.read();
-    stage.themed();
     drawLegend();
     marks.redraw();
     for (const each of panels) each.redraw();
     due();
   });
   stage.onChange = due;
-  player.listen((what) => {
-    due();
-    if (what === "state" && !player.playing) stage.pace();
-  });
+  player.listen(due);
   describePage();
   drawLegend();
   stage.resize();
   for (const each of panels) each.refresh();
   watchSizes(stage, host, panels);
-  let before = null;
   const frame = (now) => {
-    if (player.playing && before !== null) stage.pace(now - before);
-    before = player.playing ? now : null;
     if (player.advance(now) || isDue) {
       isDue = false;
       stage.draw(player.time, controls.trace);

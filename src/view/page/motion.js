@@ -1,8 +1,10 @@
 // Where the points are at any time, between rows too.
 
-const dimension = scene.dimension;
 const origin = -1;
 const free = -2;
+
+// Places have three numbers here; the components of a point in the plane are the first and the last of them.
+const components = scene.dimension === 2 ? [0, Infinity, 1] : [0, 1, 2];
 
 /// Vectors of one row: of a point that hangs on another by a rod, the rod; of any other its place. `hangs[i]` is the
 /// point that i hangs on, `origin`, or `free`.
@@ -55,7 +57,7 @@ class Motion {
       if (this.hangs[i] === free) continue;
       const length = norm(p1, i) * (1 - s) + norm(p2, i) * s;
       const factor = length / (norm(out, i) || 1);
-      for (let axis = 0; axis < dimension; ++axis) out[i * dimension + axis] *= factor;
+      for (let axis = 0; axis < 3; ++axis) out[3 * i + axis] *= factor;
     }
   }
 
@@ -63,9 +65,8 @@ class Motion {
   #hang(vectors, places) {
     for (let i = 0; i < this.count; ++i) {
       const on = this.hangs[i];
-      for (let axis = 0; axis < dimension; ++axis) {
-        const k = i * dimension + axis;
-        places[k] = vectors[k] + (on >= 0 ? places[on * dimension + axis] : 0);
+      for (let axis = 0; axis < 3; ++axis) {
+        places[3 * i + axis] = vectors[3 * i + axis] + (on >= 0 ? places[3 * on + axis] : 0);
       }
     }
     return places;
@@ -75,7 +76,7 @@ class Motion {
     const key = runs.indexOf(run) * 8 + (row & 7);
     const kept = this.#kept.get(key);
     if (kept?.row === row) return kept.vectors;
-    const vectors = kept?.vectors ?? new Float64Array(this.count * dimension);
+    const vectors = kept?.vectors ?? new Float64Array(3 * this.count);
     if (run.column(scene.points[0][1])) this.#fromPoints(run, row, vectors);
     else this.#fromAngles(run, row, vectors);
     this.#kept.set(key, { row, vectors });
@@ -83,29 +84,22 @@ class Motion {
   }
 
   #fromPoints(run, row, vectors) {
-    const place = (i, axis) => (axis < scene.points[i][2] ? run.column(scene.points[i][1] + axis)[row] : 0);
     for (let i = 0; i < this.count; ++i) {
-      const on = this.hangs[i];
-      for (let axis = 0; axis < dimension; ++axis) {
-        vectors[i * dimension + axis] = place(i, axis) - (on >= 0 ? place(on, axis) : 0);
+      for (let axis = 0; axis < 3; ++axis) {
+        vectors[3 * i + axis] = this.#place(i, axis, row, run) - this.#place(this.hangs[i], axis, row, run);
       }
     }
   }
 
-  // Of a chain: (sin θ, −cos θ), in space (sin θ cos φ, sin θ sin φ, −cos θ), by the lengths of its rods.
+  // Of a chain: (sin θ cos φ, sin θ sin φ, −cos θ), by the lengths of its rods.
   #fromAngles(run, row, vectors) {
+    const each = scene.dimension - 1;
     for (let i = 0; i < this.count; ++i) {
       const length = scene.lengths[i];
-      const theta = run.column(scene.coordinates[i * (dimension - 1)][3])[row];
-      if (dimension === 2) {
-        vectors[2 * i] = length * Math.sin(theta);
-        vectors[2 * i + 1] = -length * Math.cos(theta);
-      } else {
-        const phi = run.column(scene.coordinates[2 * i + 1][3])[row];
-        vectors[3 * i] = length * Math.sin(theta) * Math.cos(phi);
-        vectors[3 * i + 1] = length * Math.sin(theta) * Math.sin(phi);
-        vectors[3 * i + 2] = -length * Math.cos(theta);
-      }
+      const [theta, phi] = [0, 1].map((k) => (k < each ? run.column(scene.coordinates[each * i + k][3])[row] : 0));
+      vectors[3 * i] = length * Math.sin(theta) * Math.cos(phi);
+      vectors[3 * i + 1] = length * Math.sin(theta) * Math.sin(phi);
+      vectors[3 * i + 2] = -length * Math.cos(theta);
     }
   }
 
@@ -118,21 +112,15 @@ class Motion {
     return this.#isRigid(i, on);
   }
 
-  // Component of a point at a row of the first run.
-  #place(j, axis, row) {
-    return j >= 0 && axis < scene.points[j][2] ? runs[0].column(scene.points[j][1] + axis)[row] : 0;
-  }
-
-  /// How far a point gets from a place, in the first run.
-  farthest(i, place) {
-    let far = 0;
-    for (let row = 0; row < runs[0].rows; ++row) far = Math.max(far, Math.hypot(...place.map((x, axis) => this.#place(i, axis, row) - x)));
-    return far;
+  // One number of a place at a row.
+  #place(j, axis, row, run = runs[0]) {
+    const k = components[axis];
+    return j >= 0 && k < scene.points[j][2] ? run.column(scene.points[j][1] + k)[row] : 0;
   }
 
   // How far a point gets along each axis.
   #span(i) {
-    return Array.from({ length: dimension }, (_, axis) => {
+    return [0, 1, 2].map((axis) => {
       let [low, high] = [Infinity, -Infinity];
       for (let row = 0; row < runs[0].rows; ++row) {
         const x = this.#place(i, axis, row);
@@ -146,8 +134,8 @@ class Motion {
   /// rests; null if it leaves that line.
   railOf(i) {
     const run = runs[0];
-    const from = (row) => Array.from({ length: dimension }, (_, axis) => this.#place(i, axis, row) - this.#place(i, axis, 0));
-    let [far, along] = [0, [1, 0, 0].slice(0, dimension)];
+    const from = (row) => [0, 1, 2].map((axis) => this.#place(i, axis, row) - this.#place(i, axis, 0));
+    let [far, along] = [0, [1, 0, 0]];
     for (let row = 1; row < run.rows; ++row) {
       const way = from(row);
       const length = Math.hypot(...way);
@@ -166,7 +154,7 @@ class Motion {
     const run = runs[0];
     const distance = (row) => {
       let square = 0;
-      for (let axis = 0; axis < dimension; ++axis) square += (this.#place(i, axis, row) - this.#place(on, axis, row)) ** 2;
+      for (let axis = 0; axis < 3; ++axis) square += (this.#place(i, axis, row) - this.#place(on, axis, row)) ** 2;
       return Math.sqrt(square);
     };
     const first = distance(0);
@@ -179,15 +167,15 @@ class Motion {
 
   // The box that all runs stay in, with the origin; from at most 500 rows a run. `reach` is what lengths compare with.
   #measure() {
-    this.low = new Array(dimension).fill(0);
-    this.high = new Array(dimension).fill(0);
-    const places = new Float64Array(this.count * dimension);
+    this.low = [0, 0, 0];
+    this.high = [0, 0, 0];
+    const places = new Float64Array(3 * this.count);
     for (const run of this.count ? runs : []) {
       const stride = Math.max(1, Math.floor(run.rows / Math.min(500, Math.ceil(200000 / this.count))));
       for (let row = 0; row < run.rows; row += stride) {
         this.atRow(run, row, places);
         for (let k = 0; k < places.length; ++k) {
-          const axis = k % dimension;
+          const axis = k % 3;
           this.low[axis] = Math.min(this.low[axis], places[k]);
           this.high[axis] = Math.max(this.high[axis], places[k]);
         }
@@ -202,31 +190,28 @@ class Motion {
   path(run, point) {
     const parts = Math.max(1, Math.min(6, Math.floor(3000 / run.rows), Math.floor(1e6 / (run.rows * this.count))));
     const samples = (run.rows - 1) * parts + 1;
-    const path = { times: new Float64Array(samples), places: new Float32Array(samples * dimension) };
-    const places = new Float64Array(this.count * dimension);
+    const path = { times: new Float64Array(samples), places: new Float32Array(3 * samples) };
+    const places = new Float64Array(3 * this.count);
     for (let sample = 0; sample < samples; ++sample) {
       const row = Math.floor(sample / parts);
       const part = (sample % parts) / parts;
       const time = part ? run.t[row] + part * (run.t[row + 1] - run.t[row]) : run.t[row];
       this.at(run, time, places);
       path.times[sample] = time;
-      for (let axis = 0; axis < dimension; ++axis) {
-        path.places[sample * dimension + axis] = places[point * dimension + axis];
-      }
+      path.places.set(places.subarray(3 * point, 3 * point + 3), 3 * sample);
     }
     return path;
   }
 
-  /// Radii of the bobs: volumes are in proportion to masses, and no bob is too small to see.
-  get radii() {
-    const masses = scene.points.map((point) => point[3]);
-    const largest = Math.max(...masses);
-    const size = this.reach * Math.min(0.055, Math.max(0.005, 0.07 / Math.sqrt(this.count)));
-    return masses.map((mass, i) => {
-      if (kindOf(i) === "pivot") return 0.4 * size;
-      if (kindOf(i) === "floor") return dimension === 2 ? size : 0.1 * size;
-      return largest > 0 && mass > 0 ? size * Math.max(Math.cbrt(mass / largest), 0.2) : 0.7 * size;
-    });
+  /// What a stage is told.
+  get shape() {
+    const { hangs, low, high, reach } = this;
+    const kinds = scene.points.map((_, i) => kindOf(i));
+    return {
+      space: scene.dimension, hangs, kinds, masses: scene.points.map((point) => point[3]), low, high, reach,
+      rails: kinds.map((kind, i) => (kind === "cart" ? this.railOf(i) : null)),
+      connections: scene.connections.map(([kind, ...ends]) => ({ kind, ends })),
+    };
   }
 }
 
@@ -235,27 +220,10 @@ function kindOf(i) {
   return scene.points[i][4];
 }
 
-/// Whether anything is fixed to the origin.
-function holdsOrigin(motion) {
-  return motion.hangs.includes(origin) || scene.connections.some((ends) => ends.includes(origin));
-}
-
 function norm(vectors, i) {
   let square = 0;
-  for (let k = i * dimension; k < (i + 1) * dimension; ++k) square += vectors[k] * vectors[k];
+  for (let k = 3 * i; k < 3 * i + 3; ++k) square += vectors[k] * vectors[k];
   return Math.sqrt(square);
-}
-
-/// Index of the last sample of a path that is not later than a time.
-function sampleAt(times, time) {
-  let low = 0;
-  let high = times.length - 1;
-  while (low < high) {
-    const middle = (low + high + 1) >> 1;
-    if (times[middle] <= time) low = middle;
-    else high = middle - 1;
-  }
-  return low;
 }
 
 /// Points whose paths are traced: the last of a chain; of a model all bobs and carts, if there are few.

@@ -1,20 +1,14 @@
 // The plots beside the stage.
 
-/// A titled box: options, a place for a plot, a key to its curves.
-function panel(title, options = [], kind = "") {
-  const plot = element("div", { className: "plot" });
-  const keys = element("div", { className: "keys" });
-  const heading = element("h2", { textContent: title });
-  const head = element("header", {}, heading, element("div", { className: "options" }, ...options));
-  const section = element("section", { className: `panel ${kind}` }, head, plot, keys);
-  document.getElementById("panels").append(section);
-  return { section, heading, plot, keys };
-}
-
 function checkbox(text, checked, onChange) {
   const box = element("input", { type: "checkbox", checked });
   box.addEventListener("change", onChange);
   return { node: element("label", {}, box, text), get on() { return box.checked; }, box };
+}
+
+/// Of one run each curve is named, of several the legend of the page names all.
+function nameRuns(keys, curves, words) {
+  nameCurves(keys, runs.length > 1 ? [] : curves.map((curve) => [rgba(curve.colour()), curve.name]), words);
 }
 
 /// Curves of one number a run, over time, on a log scale.
@@ -69,29 +63,21 @@ class CoordinatesPanel {
     })));
     this.plot.show(curves, group.isAngle && this.wrapped.on ? "wrapped" : "linear");
     this.plot.axes.describe(`${members.map((m) => m.name).join(", ")} over time, in ${group.unit}`);
-    this.#name(curves, members, group);
+    const names = runs.length > 1 ? members.map((m) => symbol(m.name)).join(", ") : "";
+    this.words = `${names} in ${group.unit}`.trim();
+    this.#name();
   }
 
   redraw() {
     this.plot.redraw();
-    this.#colourKeys();
+    this.#name();
   }
   drawCursor() {
     this.plot.drawCursor();
   }
 
-  #name(curves, members, group) {
-    const named = runs.length > 1 ? members.map((m) => symbol(m.name)).join(", ") : "";
-    this.named = runs.length > 1 ? [] : curves;
-    const chips = this.named.map((curve) => element("span", {}, element("i"), curve.name));
-    this.box.keys.replaceChildren(...chips, `${named} in ${group.unit}`.trim());
-    this.#colourKeys();
-  }
-
-  #colourKeys() {
-    this.box.keys.querySelectorAll("i").forEach((mark, k) => {
-      mark.style.background = rgba(this.named[k].colour());
-    });
+  #name() {
+    nameRuns(this.box.keys, this.plot.curves, this.words);
   }
 
   // Whether any angle goes round.
@@ -111,26 +97,20 @@ class InputsPanel {
       run, numbers: run.column(column), name: symbol(name),
       colour: () => (several ? palette.run(k) : palette.curves[m % palette.curves.length]), alpha: runs.length > 8 ? 0.4 : 1,
     })));
-    const chips = several ? [] : this.curves.map(({ name }) => element("span", {}, element("i"), name));
     const names = inputs.map(([name]) => symbol(name)).join(", ");
-    this.box.keys.append(...chips, `${several ? names : ""} in ${unitText(unit)}`.trim());
+    this.words = `${several ? names : ""} in ${unitText(unit)}`.trim();
     this.plot.axes.describe(`${inputs.map(([name]) => name).join(", ")} over time, in ${unit}`);
   }
 
   refresh() {
     this.plot.show(this.curves, "linear");
-    this.#colourKeys();
+    nameRuns(this.box.keys, this.curves, this.words);
   }
   redraw() {
-    this.plot.redraw();
-    this.#colourKeys();
+    this.refresh();
   }
   drawCursor() {
     this.plot.drawCursor();
-  }
-
-  #colourKeys() {
-    this.box.keys.querySelectorAll("i").forEach((mark, k) => (mark.style.background = rgba(this.curves[k].colour())));
   }
 }
 

@@ -129,6 +129,13 @@ function linearTicks(axis, count, wrapped, least = 0) {
   return niceTicks(axis.low, axis.high, count, least).map((at) => ({ at, text: readable(at, 6) }));
 }
 
+/// Powers of ten between two of them, no more than `most` if they are given whole.
+const powerStep = (low, high, most) => Math.max(1, Math.ceil((high - low) / most));
+function powerTicks(low, high, most) {
+  const step = powerStep(low, high, most);
+  return Array.from({ length: Math.floor((high - low) / step) + 1 }, (_, k) => ({ at: low + k * step, text: powerOfTen(low + k * step) }));
+}
+
 /// Least and largest finite number of several arrays, and some room; apart even where all are one. What changes by less than
 /// rounding does, of numbers of a `scale`, rests.
 function rangeOf(arrays, change = (x) => x, scale = 0) {
@@ -149,6 +156,27 @@ function rangeOf(arrays, change = (x) => x, scale = 0) {
   if (high - low <= 2e-5 * size) return { low: low - 0.1 * size, high: high + 0.1 * size }; // constant, but for rounding
   const room = (high - low) * 0.04 || 1;
   return { low: low - room, high: high + room };
+}
+
+/// A titled box: options, a place for a plot, a key to its curves.
+function panel(title, options = [], kind = "") {
+  const plot = element("div", { className: "plot" });
+  const keys = element("div", { className: "keys" });
+  const heading = element("h2", { textContent: title });
+  const head = element("header", {}, heading, element("div", { className: "options" }, ...options));
+  const section = element("section", { className: `panel ${kind}` }, head, plot, keys);
+  document.getElementById("panels").append(section);
+  return { section, heading, plot, keys };
+}
+
+/// Whose colours are whose: [colour, words] of each curve, and what stands without one.
+function nameCurves(keys, curves, ...words) {
+  const chips = curves.map(([colour, name]) => {
+    const mark = element("i");
+    mark.style.background = colour;
+    return element("span", {}, mark, name);
+  });
+  keys.replaceChildren(...chips, ...words);
 }
 
 /// Curves over time. A curve is {run, numbers, colour(), alpha}, of linear ones {scale} too; `kind` is "linear", "wrapped" or "log".
@@ -172,8 +200,7 @@ class TimePlot {
     const pen = axes.begin();
     axes.x = { low: player.start, high: player.end > player.start ? player.end : player.start + 1 };
     const yTicks = this.kind === "log" ? this.#logAxis() : this.#linearAxis();
-    const xTicks = niceTicks(axes.x.low, axes.x.high, axes.mostTicks);
-    axes.drawGrid(pen, xTicks.map((at) => ({ at, text: readable(at, 6) })), yTicks, scene.timeUnit);
+    axes.drawGrid(pen, linearTicks(axes.x, axes.mostTicks), yTicks, scene.timeUnit);
     pen.lineWidth = 1.3;
     for (const curve of this.curves) this.#draw(pen, curve);
     pen.restore();
@@ -208,13 +235,12 @@ class TimePlot {
     const empty = !arrays.some((numbers) => numbers.some((x) => x > 0));
     const top = empty ? -15 : Math.ceil(high);
     const bottom = Math.min(empty ? -17 : Math.floor(low), top - 2);
-    const step = Math.max(1, Math.ceil((top - bottom) / Math.max(2, this.axes.height / 32)));
+    const most = Math.max(2, this.axes.height / 32);
+    const step = powerStep(bottom, top, most);
     const isZero = empty || arrays.some((numbers) => numbers.includes(0));
     this.floor = isZero ? bottom - step : -Infinity;
     this.axes.y = { low: (isZero ? this.floor : bottom) - 0.15 * step, high: top + 0.15 * step };
-    const ticks = isZero ? [{ at: this.floor, text: "0" }] : [];
-    for (let k = bottom; k <= top; k += step) ticks.push({ at: k, text: powerOfTen(k) });
-    return ticks;
+    return [...(isZero ? [{ at: this.floor, text: "0" }] : []), ...powerTicks(bottom, top, most)];
   }
 
   #height(number) {
@@ -229,15 +255,8 @@ class TimePlot {
       return;
     }
     pen.strokeStyle = rgba(curve.colour(), curve.alpha ?? 1);
-    pen.beginPath();
-    let before = NaN;
-    for (let row = 0; row < curve.run.rows; ++row) {
-      const y = this.#height(curve.numbers[row]);
-      const isBreak = !Number.isFinite(before) || (this.kind === "wrapped" && Math.abs(y - before) > Math.PI);
-      if (Number.isFinite(y)) pen[isBreak ? "moveTo" : "lineTo"](axes.atX(curve.run.t[row]), axes.atY(y));
-      before = y;
-    }
-    pen.stroke();
+    const rows = { from: 0, to: curve.run.rows - 1 };
+    drawCurve(pen, axes, rows, (row) => curve.run.t[row], (row) => this.#height(curve.numbers[row]), { wrapped: this.kind === "wrapped" ? 1 : -1, isOverTime: true });
   }
 
   // A point for each number, so that zeros among them tear no comb into the curve; lines where neighbours are near.
@@ -328,15 +347,6 @@ class PhasePlot {
   }
 
   #trace(pen, curve, from, to) {
-    const { axes } = this;
-    pen.beginPath();
-    let before = NaN;
-    for (let row = from; row <= to; ++row) {
-      const q = this.#place(curve.q[row]);
-      const isBreak = Number.isNaN(before) || (this.wrapped && Math.abs(q - before) > Math.PI);
-      pen[isBreak ? "moveTo" : "lineTo"](axes.atX(q), axes.atY(curve.rate[row]));
-      before = q;
-    }
-    pen.stroke();
+    drawCurve(pen, this.axes, { from, to }, (row) => this.#place(curve.q[row]), (row) => curve.rate[row], { wrapped: this.wrapped ? 0 : -1 });
   }
 }

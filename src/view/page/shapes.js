@@ -17,6 +17,13 @@ function uprightAngle(dx, dy) {
   return angle <= -Math.PI / 2 + 1e-9 ? angle + Math.PI : angle;
 }
 
+function drawDisc(pen, x, y, radius, style) {
+  pen.beginPath();
+  pen.arc(x, y, radius, 0, 2 * Math.PI);
+  pen.fillStyle = style;
+  pen.fill();
+}
+
 function drawRail(pen, [x0, y0], [x1, y1], size) {
   const angle = uprightAngle(x1 - x0, y1 - y0);
   const [dx, dy] = [-Math.sin(angle), Math.cos(angle)].map((x) => x * proportions.railBelow * size);

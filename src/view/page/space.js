@@ -1,228 +1,327 @@
-// The stage of motions in space: three.js, with a floor, a light, and shadows that the light throws straight down it.
+// The stage of what moves in space: over a floor, in light, with shadows that the sun throws. What is far is drawn first.
 
-/// From so many balls on, they are drawn as impostors.
-const manyBalls = 60;
+const plus = (a, b, factor = 1) => a.map((x, axis) => x + factor * b[axis]);
+const across = (a, b) => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
 
-/// How much of the screen's resolution is used.
-class Fineness {
-  now = 1;
-  #playing = 1; // while frames come
-  #sum = 0;
-  #frames = 0;
-
-  /// Whether another resolution is due after a frame of so many milliseconds, or, without a number, a pause.
-  changes(interval) {
-    const before = this.now;
-    this.now = interval === undefined ? 1 : this.#playing;
-    if (interval === undefined) this.#sum = this.#frames = 0;
-    else this.#count(interval);
-    return this.now !== before;
+class Space {
+  constructor(stage) {
+    this.stage = stage;
+    this.pictures = new BallPictures();
+    this.floorSize = 3.2 * stage.radius;
+    this.grid = this.#gridLines();
+    this.pivotRadius = Math.min(0.014 * stage.reach, 1.4 * Math.max(...stage.radii));
+    this.wireRadius = Math.max(0.006 * stage.reach, 0.2 * Math.min(...stage.radii));
   }
 
-  // Six frames at a time; below 40 a second they are drawn coarser.
-  #count(interval) {
-    this.#sum += interval;
-    if (++this.#frames < 6) return;
-    if (this.#sum / this.#frames > 25) this.now = this.#playing = Math.max(this.#playing * 0.7, 0.45);
-    this.#sum = this.#frames = 0;
-  }
-}
-
-class Stage {
-  constructor(host, motion) {
-    if (!THREE) throw new Error("three.js did not load");
-    this.motion = motion;
-    this.canvas = host.appendChild(element("canvas", { tabIndex: 0 }));
-    this.renderer = new THREE.WebGLRenderer({ canvas: this.canvas, antialias: true, alpha: false });
-    this.scene = new THREE.Scene();
-    this.places = runs.map(() => new Float64Array(motion.count * 3));
-    this.#measure();
-    this.#light();
-    this.#layFloor();
-    this.#addBodies();
-    this.onChange = () => {};
-    this.camera = new OrbitCamera(new THREE.PerspectiveCamera(32, 1, 0.1, 100), this.middle, this.radius);
-    this.#watch();
-    this.themed();
+  draw(figures) {
+    const { stage } = this;
+    const { middle, axes, far } = stage;
+    this.pen = stage.pen;
+    this.eye = plus(middle, axes[2], far);
+    this.mirror = mirrorOf(axes[2]);
+    this.items = []; // {depth, draw, faint}
+    const isFew = figures.length <= 8;
+    this.#drawFloor();
+    figures.forEach((figure, k) => this.#add(figure, isFew || k === figures.length - 1));
+    if (holdsOrigin(stage)) this.#addPost();
+    this.items.sort((a, b) => b.faint - a.faint || a.depth - b.depth); // what is solid is seen among many copies
+    for (const { draw } of this.items) draw();
   }
 
-  static kind = "space";
-
-  get description() {
-    return `${scene.subject}, moving, in perspective over a floor. Plots of the same motion follow.`;
+  // How much of what lies on the floor is lost in what is behind it.
+  #haze(depth) {
+    const part = clamp((-depth / this.stage.radius - 0.8) / 3.2, 0, 1);
+    return part * part * (3 - 2 * part);
   }
 
-  #watch() {
-    watchGestures(this.canvas, {
-      turn: (dx, dy) => this.#change(() => this.camera.turn(-dx * 0.008, dy * 0.008)),
-      move: (dx, dy) => this.#change(() => this.camera.move(-dx / this.height, dy / this.height)),
-      zoom: (factor) => this.zoom(factor),
-    });
-  }
-
-  #change(change) {
-    change();
-    this.onChange();
-  }
-
-  reset() {
-    this.#change(() => this.camera.reset());
-  }
-  zoom(factor) {
-    this.#change(() => this.camera.zoom(factor));
-  }
-  turn(x, y) {
-    this.#change(() => this.camera.turn(x * 0.1, y * 0.1));
-  }
-  move(x, y) {
-    this.#change(() => this.camera.move(x * 0.05, y * 0.05));
-  }
-
-  /// Told how long each frame took while playing [ms], nothing when paused: where no GPU helps, motion is drawn coarser
-  /// until frames come in time, and stills are drawn as fine as the screen.
-  pace(interval) {
-    this.fineness ??= new Fineness();
-    if (this.fineness.changes(interval)) this.resize();
-  }
-
-  resize() {
-    const { clientWidth: width, clientHeight: height } = this.canvas;
-    this.height = Math.max(height, 1);
-    this.renderer.setPixelRatio(Math.min(window.devicePixelRatio || 1, 2) * (this.fineness?.now ?? 1));
-    this.renderer.setSize(width, height, false);
-    this.camera.fit(width / this.height);
-    this.onChange();
-  }
-
-  // The middle of what moves, and the sphere about it; the floor is a little below.
-  #measure() {
-    const { low, high, reach } = this.motion;
-    this.floor = Math.min(low[2], -0.02 * reach) - 0.16 * reach;
-    this.middle = [(low[0] + high[0]) / 2, (low[1] + high[1]) / 2, (this.floor + Math.max(high[2], 0)) / 2];
-    const half = [0, 1, 2].map((axis) => Math.max(high[axis] - this.middle[axis], this.middle[axis] - low[axis]));
-    const fixed = scene.points.map((_, i) => (kindOf(i) === "bob" ? 0 : this.motion.farthest(i, this.middle)));
-    this.radius = Math.max(half[0], half[1], half[2], 0.5 * reach, ...fixed) * 1.12;
-  }
-
-  #light() {
-    const sky = new THREE.HemisphereLight(0xffffff, 0x8a8a8a, 0.75);
-    sky.position.set(0, 0, 1);
-    const sun = new THREE.DirectionalLight(0xffffff, 0.6);
-    this.sun = [0.35, -0.25, 1];
-    sun.position.set(...this.sun);
-    const side = new THREE.DirectionalLight(0xffffff, 0.2);
-    side.position.set(-1, 0.6, 0.2);
-    this.scene.add(sky, sun, side);
-  }
-
-  // A disc with a grid, which fades at its rim into what is behind.
-  #layFloor() {
-    const size = this.radius * 3.2;
-    const disc = new THREE.CircleBufferGeometry(size, 96);
-    this.disc = new THREE.Mesh(disc, new THREE.MeshBasicMaterial({ polygonOffset: true, polygonOffsetFactor: 2, polygonOffsetUnits: 2 }));
-    this.disc.position.set(this.middle[0], this.middle[1], this.floor);
-    const ticks = niceTicks(0, size, 7);
-    this.square = ticks[1] - ticks[0];
-    this.grid = new THREE.LineSegments(this.#gridGeometry(size), new THREE.LineBasicMaterial({ vertexColors: THREE.VertexColors }));
-    this.grid.position.copy(this.disc.position);
-    const post = new THREE.BufferGeometry().setFromPoints([new THREE.Vector3(0, 0, 0), new THREE.Vector3(0, 0, this.floor)]);
-    this.post = new THREE.Line(post, new THREE.LineBasicMaterial());
-    this.pivot = new THREE.Mesh(new THREE.SphereBufferGeometry(Math.min(0.014 * this.motion.reach, 1.4 * Math.max(...this.motion.radii)), 16, 12), new THREE.MeshBasicMaterial());
-    this.post.visible = this.pivot.visible = holdsOrigin(this.motion);
-    this.scene.add(this.disc, this.grid, this.post, this.pivot);
-  }
-
-  #gridGeometry(size) {
-    const points = [];
-    this.rim = [];
-    const parts = 24;
-    const add = (x, y) => {
-      points.push(new THREE.Vector3(x, y, 0));
-      this.rim.push(Math.min(1, Math.hypot(x, y) / size));
-    };
-    const count = Math.floor(size / this.square);
-    for (let k = -count; k <= count; ++k) {
-      const across = k * this.square;
-      const half = Math.sqrt(Math.max(size * size - across * across, 0));
-      for (let part = 0; part < parts; ++part) {
-        const [a, b] = [part, part + 1].map((p) => -half + (2 * half * p) / parts);
-        add(a, across), add(b, across), add(across, a), add(across, b);
+  // Pieces of lines, and how near the rim each is.
+  #gridLines() {
+    const size = this.floorSize;
+    const [first, second] = niceTicks(0, size, 7);
+    const square = second - first;
+    const [places, rims] = [[], []];
+    const { middle: [x0, y0], floor } = this.stage;
+    const add = (x, y) => (places.push(x0 + x, y0 + y, floor), rims.push(Math.min(Math.hypot(x, y) / size, 1)));
+    for (let k = -Math.floor(size / square); k * square <= size; ++k) {
+      const half = Math.sqrt(Math.max(size * size - (k * square) ** 2, 0));
+      for (let part = 0; part < 24; ++part) {
+        const [a, b] = [part, part + 1].map((p) => -half + (half * p) / 12);
+        add(a, k * square), add(b, k * square), add(k * square, a), add(k * square, b);
       }
     }
-    const geometry = new THREE.BufferGeometry().setFromPoints(points);
-    geometry.setAttribute("color", new THREE.BufferAttribute(new Float32Array(3 * points.length), 3));
-    return geometry;
+    return { places, rims };
   }
 
-  // Straight onto the floor, along the sun's rays: a matrix, no second look from the light.
-  #shadow() {
-    const [x, y, z] = this.sun;
-    const height = this.floor + 0.001 * this.radius;
-    const matrix = new THREE.Matrix4().set(1, 0, -x / z, (x / z) * height, 0, 1, -y / z, (y / z) * height, 0, 0, 0, height, 0, 0, 0, 1);
-    // A material for meshes in instances, and one for others: three.js compiles each once.
-    const flat = { material: new THREE.MeshBasicMaterial(), single: new THREE.MeshBasicMaterial(), disc: discMaterial(), rod: rodMaterial() };
-    flat.disc.uniforms.shaded.value = flat.rod.uniforms.shaded.value = 0;
-    return { matrix, ...flat };
+  // It fades with its depth, of which its height on the screen tells; from below it is not seen.
+  #drawFloor() {
+    const { pen, stage, floorSize } = this;
+    const { middle: [x0, y0], floor, view } = stage;
+    const isAbove = this.eye[2] > floor;
+    if (isAbove) {
+      const rim = Array.from({ length: 96 }, (_, k) => [x0 + floorSize * Math.cos((k * Math.PI) / 48), y0 + floorSize * Math.sin((k * Math.PI) / 48), floor]);
+      const along = Array.from({ length: 17 }, (_, k) => stage.project(x0 + (k / 8 - 1) * floorSize * Math.cos(view.azimuth), y0 + (k / 8 - 1) * floorSize * Math.sin(view.azimuth), floor));
+      const [first, last] = [along[0][1], along.at(-1)[1]];
+      const colours = pen.createLinearGradient(0, first, 0, last);
+      const mixed = (haze) => palette.rgb.floor.map((c, k) => c + (palette.rgb.ground[k] - c) * haze);
+      for (const [, y, , depth] of along) colours.addColorStop(clamp((y - first) / (last - first || 1), 0, 1), rgba(mixed(this.#haze(depth))));
+      this.#fill(stage.projected(rim.flat()), colours);
+    }
+    const shown = stage.projected(this.grid.places);
+    const byStrength = Array.from({ length: 8 }, () => []);
+    for (let k = 0; k < shown.length; k += 8) {
+      const strength = (1 - this.grid.rims[k / 4]) * (1 - this.#haze(shown[k + 3]));
+      byStrength[Math.min(Math.floor(8 * strength), 7)].push(k);
+    }
+    pen.lineWidth = 1;
+    byStrength.forEach((pieces, level) => {
+      pen.strokeStyle = palette.css("line", (level + 0.5) / 8);
+      pen.beginPath();
+      for (const k of pieces) pen.moveTo(shown[k], shown[k + 1]), pen.lineTo(shown[k + 4], shown[k + 5]);
+      pen.stroke();
+    });
+    this.shadow = isAbove ? palette.css("shade") : null;
   }
 
-  #addBodies() {
-    const { motion } = this;
-    const radii = motion.radii.map((radius) => (runs.length > 8 ? 0.6 * radius : radius));
-    this.shadow = this.#shadow();
-    const Bodies = motion.count * runs.length > manyBalls ? FlatBodies : RoundBodies;
-    this.bodies = runs.map((_, k) => new Bodies(motion, radii, runs.length <= 8 || k === 0 ? this.shadow : null));
-    const most = runs.length > 8 ? 400 : 2000;
-    const width = (runs.length > 8 ? 0.0025 : 0.004) * this.radius;
-    this.traces = runs.map((run) => traced.map((point) => new Trace(motion.path(run, point), most, width)));
-    for (const body of this.bodies) this.scene.add(...body.objects);
-    this.fittings = runs.slice(0, runs.length <= 8 ? runs.length : 1).map(() => new Fittings(motion, radii, this.shadow));
-    for (const object of this.fittings.flatMap((each) => each.objects)) this.scene.add(object);
-    for (const trace of this.traces.flat()) this.scene.add(trace.mesh);
+  #fill(shown, style) {
+    const { pen } = this;
+    pen.beginPath();
+    for (let k = 0; k < shown.length; k += 4) pen.lineTo(shown[k], shown[k + 1]);
+    pen.closePath();
+    pen.fillStyle = style;
+    pen.fill();
   }
 
-  /// Takes the colours of the theme.
-  themed() {
-    const unit = (rgb) => rgb.map((c) => c / 255);
-    const { rgb } = palette;
-    this.scene.background = new THREE.Color(...unit(rgb.ground));
-    this.scene.fog = new THREE.Fog(this.scene.background, 1, 2); // placed with each frame
-    this.disc.material.color.setRGB(...unit(rgb.floor));
-    for (const material of [this.shadow.material, this.shadow.single, this.shadow.disc, this.shadow.rod]) paint(material, unit(rgb.shade));
-    this.post.material.color.setRGB(...unit(rgb.edge));
-    this.pivot.material.color.setRGB(...unit(rgb.ink));
-    this.#colourGrid(unit(rgb.line), unit(rgb.floor));
-    this.bodies.forEach((body, k) => {
-      const own = unit(palette.run(k));
-      for (const trace of this.traces[k]) trace.colour(own);
-      this.fittings[k]?.colour({ cart: runs.length > 1 ? own : unit(rgb.bob), spring: unit(rgb.rod), rail: unit(rgb.edge), pivot: unit(rgb.ink) });
-      body.colour(runs.length > 1 ? { ball: own, tip: own, rod: own } : { ball: unit(rgb.bob), tip: own, rod: unit(rgb.rod) });
+  #put(depth, draw) {
+    this.items.push({ depth, draw, faint: this.faint });
+  }
+
+  // Where the shadow of a place falls.
+  #onFloor([x, y, z]) {
+    const high = (z - this.stage.floor) / sun[2];
+    return [x - high * sun[0], y - high * sun[1], this.stage.floor];
+  }
+
+  #add(figure, hasShadow) {
+    const { stage } = this;
+    const { places, rgb, faint, traces } = figure;
+    const radii = faint ? stage.radii.map((radius) => 0.6 * radius) : stage.radii;
+    this.faint = faint;
+    const at = (i) => (i < 0 ? [0, 0, 0] : Array.from(places.subarray(3 * i, 3 * i + 3)));
+    this.rodRadius = Math.min(0.008 * stage.reach, 0.35 * Math.min(...radii)) * (faint ? 0.6 : 1);
+    this.throws = hasShadow && this.shadow !== null;
+    const rods = this.#rodsOf(places, radii);
+    if (this.throws) this.#drawShadows(places, radii, rods);
+    this.#addBalls(places, radii, rgb);
+    const parts = clamp(Math.round(24 / stage.count), 1, 6);
+    for (const { from, to } of rods) this.#addBar(from, to, parts, this.rodRadius, rgb.rod);
+    for (const { kind, ends } of stage.connections) this.#addConnection(kind, ...ends.map(at), rgb.rod);
+    stage.kinds.forEach((kind, i) => kind === "cart" && this.#addCart(at(i), stage.rails[i], 1.4 * radii[i], rgb));
+    for (const each of traces) this.#addTrace(each, faint, radii);
+  }
+
+  // From where each rod comes out of a ball to where it goes into another, if it does.
+  #rodsOf(places, radii) {
+    const rods = [];
+    for (const { on, i } of this.stage.rods) {
+      const [x0, y0, z0] = on < 0 ? [0, 0, 0] : [places[3 * on], places[3 * on + 1], places[3 * on + 2]];
+      const [x, y, z] = [places[3 * i] - x0, places[3 * i + 1] - y0, places[3 * i + 2] - z0];
+      const length = Math.hypot(x, y, z);
+      const [begin, end] = [on < 0 ? this.pivotRadius : radii[on], length - radii[i]];
+      if (end > begin) rods.push({ from: plus([x0, y0, z0], [x, y, z], begin / length), to: plus([x0, y0, z0], [x, y, z], end / length) });
+    }
+    return rods;
+  }
+
+  // Of rods bands of their width, of balls discs.
+  #drawShadows(places, radii, rods) {
+    const { pen, stage } = this;
+    for (const { from, to } of rods) this.#throw([from, to], this.rodRadius);
+    const shown = stage.projected(radii.flatMap((_, i) => this.#onFloor(places.subarray(3 * i, 3 * i + 3))));
+    const high = this.eye[2] - stage.floor;
+    pen.fillStyle = this.shadow;
+    pen.beginPath();
+    radii.forEach((radius, i) => {
+      if (stage.kinds[i] === "cart") return;
+      const [x, y, near, depth] = shown.subarray(4 * i, 4 * i + 4);
+      const wide = radius * stage.pixels * near;
+      pen.moveTo(x + wide, y);
+      pen.ellipse(x, y, wide, wide * Math.min(high / (stage.far - depth), 1), 0, 0, 2 * Math.PI);
+    });
+    pen.fill();
+  }
+
+  // The shadow of a line through places.
+  #throw(places, radius) {
+    if (!this.throws) return;
+    const { pen, stage } = this;
+    const flat = places.map((place) => this.#onFloor(place));
+    pen.fillStyle = this.shadow;
+    pen.beginPath();
+    for (let k = 0; k + 1 < flat.length; ++k) {
+      const [dx, dy] = [0, 1].map((axis) => flat[k + 1][axis] - flat[k][axis]);
+      const wide = radius / (Math.hypot(dx, dy) || 1);
+      const corners = [[k, 1], [k + 1, 1], [k + 1, -1], [k, -1]].flatMap(([at, side]) => plus(flat[at], [-dy, dx, 0], side * wide));
+      const shown = stage.projected(corners);
+      pen.moveTo(shown[0], shown[1]), pen.lineTo(shown[4], shown[5]), pen.lineTo(shown[8], shown[9]), pen.lineTo(shown[12], shown[13]);
+    }
+    pen.fill();
+  }
+
+  #addBalls(places, radii, rgb) {
+    const { pen, stage } = this;
+    const { axes, pixels, fine, kinds, count } = stage;
+    const shown = stage.projected(places);
+    const colour = (i) => (kinds[i] === "pivot" ? palette.rgb.ink : i === count - 1 ? rgb.tip : rgb.ball);
+    for (let i = 0; i < count; ++i) {
+      if (kinds[i] === "cart") continue;
+      const radius = Math.max(radii[i] * pixels * shown[4 * i + 2] * (kinds[i] === "pivot" ? 1.15 : 1), 0.8);
+      const picture = this.pictures.of(colour(i), 2 * radius * fine, axes);
+      this.#put(shown[4 * i + 3], () => pen.drawImage(picture, shown[4 * i] - radius, shown[4 * i + 1] - radius, 2 * radius, 2 * radius));
+    }
+  }
+
+  // A round bar in some parts: it may be before one thing and behind another.
+  #addBar(from, to, parts, radius, rgb) {
+    const along = plus(to, from, -1);
+    const shown = this.stage.projected(Array.from({ length: parts + 1 }, (_, k) => plus(from, along, k / parts)).flat());
+    const [a, b] = [shown, shown.subarray(4 * parts)];
+    const style = rgb ? this.#shadesOf(from, to, a, b, radius, rgb) : palette.css("edge");
+    for (let k = 0; k < parts; ++k) {
+      this.#addPart(shown.subarray(4 * k, 4 * k + 4), shown.subarray(4 * k + 4, 4 * k + 8), radius, style, k < parts - 1);
+    }
+  }
+
+  // A round wire through places.
+  #addWire(places, radius, rgb) {
+    const shown = this.stage.projected(places.flat());
+    for (let k = 0; k + 1 < places.length; ++k) {
+      const [a, b] = [shown.subarray(4 * k, 4 * k + 4), shown.subarray(4 * k + 4, 4 * k + 8)];
+      this.#addPart(a, b, radius, this.#shadesOf(places[k], places[k + 1], a, b, radius, rgb), true);
+    }
+  }
+
+  #widthOf(a, b, radius) {
+    return Math.max(radius * this.stage.pixels * (a[2] + b[2]), 1);
+  }
+
+  // Where it goes on it is a little longer, so that nothing is seen between.
+  #addPart(a, b, radius, style, goesOn) {
+    const { pen } = this;
+    const further = goesOn ? 0.6 / (Math.hypot(b[0] - a[0], b[1] - a[1]) || 1) : 0;
+    this.#put((a[3] + b[3]) / 2, () => {
+      pen.strokeStyle = style;
+      pen.lineWidth = this.#widthOf(a, b, radius);
+      pen.lineCap = "butt";
+      line(pen, a[0], a[1], b[0] + further * (b[0] - a[0]), b[1] + further * (b[1] - a[1]));
+      pen.lineCap = "round";
     });
   }
 
-  #colourGrid(colour, floor) {
-    const colours = this.grid.geometry.attributes.color;
-    this.rim.forEach((rim, k) => {
-      for (let c = 0; c < 3; ++c) colours.array[3 * k + c] = colour[c] + (floor[c] - colour[c]) * rim;
-    });
-    colours.needsUpdate = true;
+  // The shades of a round bar between places, a and b on the screen: across it; of a thin one its middle's.
+  #shadesOf(from, to, a, b, radius, rgb) {
+    const { pen, stage: { axes } } = this;
+    const along = unit(plus(to, from, -1));
+    const eye = unit(plus(this.eye, plus(from, to).map((x) => x / 2), -1));
+    const facing = unit(plus(eye, along, -dotOf(eye, along)));
+    const width = this.#widthOf(a, b, radius);
+    if (!facing.every(Number.isFinite)) return rgba(rgb); // seen from its end
+    if (width < 2) return rgba(lit(rgb, lightOn(facing, this.mirror)));
+    const side = across(along, facing);
+    const [dx, dy] = [a[1] - b[1], b[0] - a[0]];
+    const half = (Math.sign(dx * dotOf(side, axes[0]) - dy * dotOf(side, axes[1])) * width) / 2 / (Math.hypot(dx, dy) || 1);
+    const [x, y] = [(a[0] + b[0]) / 2, (a[1] + b[1]) / 2];
+    const shades = pen.createLinearGradient(x - half * dx, y - half * dy, x + half * dx, y + half * dy);
+    for (const s of [-1, -0.5, 0, 0.5, 1]) {
+      const normal = plus(side.map((c) => s * c), facing, Math.sqrt(1 - s * s));
+      shades.addColorStop((s + 1) / 2, rgba(lit(rgb, lightOn(normal, this.mirror))));
+    }
+    return shades;
   }
 
-  draw(time, trace) {
-    const since = time - trace * (runs[0].end - runs[0].start);
-    const eye = this.camera.camera.position;
-    runs.forEach((run, k) => {
-      const places = this.motion.at(run, time, this.places[k]);
-      this.bodies[k].move(places);
-      this.fittings[k]?.move(places);
-      traced.forEach((point, n) => {
-        this.traces[k][n].mesh.visible = trace > 0;
-        if (trace === 0) return;
-        const tip = places.subarray(3 * point, 3 * point + 3);
-        this.traces[k][n].move(since, time, tip, eye, trace < 1);
-      });
+  // A spring with its windings, or a thread.
+  #addConnection(kind, from, to, rgb) {
+    const along = plus(to, from, -1);
+    const isSpring = kind === "spring";
+    const z = unit(along.map((x) => x || 1e-12));
+    const x = unit(across(Math.abs(z[0]) < 0.9 ? [1, 0, 0] : [0, 1, 0], z));
+    const y = across(z, x);
+    const { springEnd } = proportions;
+    const parts = isSpring ? 12 * springTurns : 8;
+    // Straight to the axis at both ends, half a turn from there.
+    const places = Array.from({ length: parts + 1 }, (_, k) => {
+      const part = clamp((k / parts - springEnd) / (1 - 2 * springEnd), 0, 1);
+      const angle = 2 * Math.PI * springTurns * part;
+      const wide = isSpring ? 0.05 * this.stage.reach * clamp(2 * springTurns * Math.min(part, 1 - part), 0, 1) : 0;
+      return plus(plus(plus(from, along, k / parts), x, wide * Math.cos(angle)), y, wide * Math.sin(angle));
     });
-    this.scene.fog.near = this.camera.distance + 0.8 * this.radius;
-    this.scene.fog.far = this.camera.distance + 4 * this.radius;
-    this.renderer.render(this.scene, this.camera.camera);
+    const radius = isSpring ? this.wireRadius : 0.5 * this.wireRadius;
+    this.#addWire(places, radius, rgb);
+    this.#throw(places, radius);
+  }
+
+  // x is the way it runs, z up if it can be.
+  #addCart(place, rail, size, rgb) {
+    const x = rail ?? [1, 0, 0];
+    const level = across([0, 0, 1], x);
+    const y = Math.hypot(...level) > 1e-6 ? unit(level) : [0, 1, 0];
+    const frame = [x, y, across(x, y)];
+    const { cartLong, cartHigh, wheelAside, wheelBelow, wheel } = proportions;
+    const box = [[-1, -1], [1, -1], [1, 1], [-1, 1]].map(([a, c]) => [a * cartLong * size, c * cartHigh * size]);
+    for (const side of [-0.8, 0.8]) {
+      for (const aside of [-wheelAside, wheelAside]) {
+        const disc = Array.from({ length: 14 }, (_, k) => [aside, -wheelBelow].map((c, axis) => size * (c + wheel * (axis ? Math.sin : Math.cos)((k * Math.PI) / 7))));
+        this.#addPrism(place, frame, disc, side * size, 0.1 * size, palette.rgb.edge);
+      }
+      if (!rail) continue;
+      // Rails lie still, about the place next to the origin.
+      const middle = plus(plus(plus(place, rail, -dotOf(place, rail)), frame[1], side * size), frame[2], -1.06 * size);
+      const ends = [-2, 2].map((way) => plus(middle, rail, way * this.stage.reach));
+      this.#addBar(...ends, 16, 0.05 * size, palette.rgb.edge);
+      this.#throw(ends, 0.05 * size);
+    }
+    this.#addPrism(place, frame, box, 0, 0.8 * size, rgb.ball);
+  }
+
+  // A convex polygon in the plane of the frame's x and z, `deep` to both sides of `aside` along its y.
+  #addPrism(place, [x, y, z], polygon, aside, deep, rgb) {
+    const { stage } = this;
+    const corner = ([a, c], b) => plus(plus(plus(place, x, a), y, aside + b), z, c);
+    const [front, back] = [-deep, deep].map((b) => polygon.map((each) => corner(each, b)));
+    const faces = [front, back, ...polygon.map((_, k) => [front[k], front[(k + 1) % polygon.length], back[(k + 1) % polygon.length], back[k]])];
+    const middleOf = (corners) => corners.reduce((sum, each) => plus(sum, each, 1 / corners.length), [0, 0, 0]);
+    const middle = middleOf([...front, ...back]);
+    if (this.throws) for (const face of faces) this.#fill(stage.projected(face.flatMap((each) => this.#onFloor(each))), this.shadow);
+    this.#put(stage.project(...middle)[3], () => {
+      for (const face of faces) {
+        const here = middleOf(face);
+        let normal = unit(across(plus(face[1], face[0], -1), plus(face[2], face[0], -1)));
+        if (dotOf(normal, plus(here, middle, -1)) < 0) normal = normal.map((c) => -c);
+        if (dotOf(normal, plus(this.eye, here, -1)) > 0) this.#fill(stage.projected(face.flat()), rgba(lit(rgb, lightOn(normal, this.mirror))));
+      }
+    });
+  }
+
+  // Below the origin, to the floor.
+  #addPost() {
+    const { pen, stage } = this;
+    this.#addBar([0, 0, 0], [0, 0, stage.floor], 12, 0);
+    const [x, y, near, depth] = stage.project(0, 0, 0);
+    this.#put(depth, () => drawDisc(pen, x, y, Math.max(this.pivotRadius * stage.pixels * near, 2), palette.css("ink")));
+  }
+
+  // Up to where it comes out of its ball; it runs out thin and pale.
+  #addTrace({ way, rgb, isUniform, point = this.stage.count - 1 }, isFaint, radii) {
+    const { pen, stage } = this;
+    const last = way.length - 3;
+    const gone = (k) => Math.hypot(way[k] - way[last], way[k + 1] - way[last + 1], way[k + 2] - way[last + 2]);
+    let end = last;
+    while (end > 0 && gone(end) < radii[point]) end -= 3;
+    const seen = way.slice(0, end + 6);
+    if (end < last && gone(end) > 0) for (let axis = 0; axis < 3; ++axis) seen[end + 3 + axis] = way[last + axis] + (way[end + axis] - way[last + axis]) * (radii[point] / gone(end));
+    const width = (isFaint ? 0.005 : 0.008) * stage.radius * stage.pixels;
+    for (const piece of piecesOf(stage.projected(seen), isFaint ? 5 : 40, isUniform)) {
+      const middle = 4 * Math.floor(piece.line.length / 8);
+      this.#put(piece.line[middle + 3], () => drawPiece(pen, piece, rgb, Math.max(width * piece.line[middle + 2] * (isUniform ? 1 : Math.sqrt(piece.age)), 0.5)));
+    }
   }
 }

@@ -1,77 +1,53 @@
 // What a point leaves behind it.
 
-/// One colour, as strong as each corner says.
-function fadingMaterial() {
-  return new THREE.ShaderMaterial({
-    uniforms: { color: { value: new THREE.Color() } },
-    vertexShader: `attribute float strength; varying float seen;
-      void main() { seen = strength; gl_Position = projectionMatrix * modelViewMatrix * vec4(position, 1.0); }`,
-    fragmentShader: `uniform vec3 color; varying float seen;
-      void main() { gl_FragColor = vec4(color, seen); }`,
-    transparent: true,
-    depthWrite: false, // where it crosses itself the newer part lies on the older
-    side: THREE.DoubleSide,
-  });
+/// A trace in pieces of one brightness each, oldest first: {line, strength, age}; `line` is what View.projected gives of a
+/// piece, `age` runs to 1. A stroke costs much more than a point.
+function piecesOf(line, count, isUniform) {
+  const last = line.length / 4 - 1;
+  const pieces = [];
+  for (let piece = 0; piece < count; ++piece) {
+    const [from, to] = [piece, piece + 1].map((k) => Math.floor((last * k) / count));
+    if (to <= from) continue;
+    const age = (piece + 1) / count;
+    pieces.push({ line: line.subarray(4 * from, 4 * to + 4), age, strength: isUniform ? 0.55 : age ** 1.5 });
+  }
+  return pieces;
 }
 
-/// The path of a point behind it: a ribbon that faces the eye, and runs out thin and pale.
-class Trace {
-  constructor(path, most, width) {
-    this.path = path;
-    this.most = most;
-    this.width = width;
-    this.geometry = new THREE.BufferGeometry();
-    const attribute = (size) =>
-      new THREE.BufferAttribute(new Float32Array(2 * size * most), size).setUsage(THREE.DynamicDrawUsage);
-    this.geometry.setAttribute("position", attribute(3));
-    this.geometry.setAttribute("strength", attribute(1));
-    const corners = Array.from({ length: most - 1 }, (_, k) => [0, 1, 2, 2, 1, 3].map((c) => 2 * k + c)).flat();
-    this.geometry.setIndex(corners);
-    this.mesh = new THREE.Mesh(this.geometry, fadingMaterial());
-    this.mesh.renderOrder = 2; // after the bodies: it lets through what is behind it
-    this.mesh.frustumCulled = false;
-    this.middle = new Float64Array(3 * most);
-  }
+/// Draws a piece; of one that goes to and fro too closely to be seen what it covers.
+function drawPiece(pen, { line, strength }, rgb, width) {
+  const cover = coverOf(line);
+  pen.strokeStyle = rgba(rgb, strength);
+  pen.fillStyle = rgba(rgb, 0.4 * strength);
+  pen.lineWidth = width;
+  pen.lineCap = "butt"; // pieces let through what is behind them: round ends would be seen twice
+  pen.beginPath();
+  if (cover) for (const [x, y] of cover) pen.lineTo(x, y);
+  else for (let k = 0; k < line.length; k += 4) pen.lineTo(line[k], line[k + 1]);
+  cover ? pen.fill() : pen.stroke();
+  pen.lineCap = "round";
+}
 
-  /// From one time to another, with `tip` as the last place; `eye` is where it is seen from.
-  move(since, time, tip, eye, fades) {
-    const count = this.#gather(since, time, tip);
-    const { position, strength } = this.geometry.attributes;
-    for (let k = 0; k < count; ++k) {
-      const fade = fades ? (k + 1) / count : 1;
-      this.#widen(position.array, k, count, eye, this.width * Math.sqrt(fade));
-      strength.array[2 * k] = strength.array[2 * k + 1] = fades ? fade ** 1.4 : 0.75;
+/// The convex hull of a way on the screen that runs to and fro with less than a few pixels between; null of any other.
+function coverOf(line) {
+  let [left, right, high, low, length] = [Infinity, -Infinity, Infinity, -Infinity, 0];
+  for (let k = 0; k < line.length; k += 4) {
+    const [x, y] = [line[k], line[k + 1]];
+    left = Math.min(left, x), right = Math.max(right, x), high = Math.min(high, y), low = Math.max(low, y);
+    if (k) length += Math.hypot(x - line[k - 4], y - line[k - 3]);
+  }
+  if (length < 3 * Math.hypot(right - left, low - high) || length < 12) return null;
+  const side = (a, b, c) => (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);
+  const half = (places) => {
+    const kept = [];
+    for (const place of places) {
+      while (kept.length > 1 && side(kept.at(-2), kept.at(-1), place) <= 0) kept.pop();
+      kept.push(place);
     }
-    this.geometry.setDrawRange(0, 6 * (count - 1));
-    position.needsUpdate = strength.needsUpdate = true;
-  }
-
-  colour(rgb) {
-    paint(this.mesh.material, rgb);
-  }
-
-  #gather(since, time, tip) {
-    const { times, places } = this.path;
-    const to = sampleAt(times, time);
-    const from = Math.min(sampleAt(times, since), to);
-    const stride = Math.max(1, Math.ceil((to - from + 2) / (this.most - 1)));
-    let count = 0;
-    for (let s = from; s <= to; s += stride, ++count) {
-      for (let axis = 0; axis < 3; ++axis) this.middle[3 * count + axis] = places[3 * s + axis];
-    }
-    for (let axis = 0; axis < 3; ++axis) this.middle[3 * count + axis] = tip[axis];
-    return count + 1;
-  }
-
-  // Two corners, across the path and the ray to the eye.
-  #widen(position, k, count, eye, width) {
-    const m = this.middle;
-    const [before, after] = [3 * Math.max(k - 1, 0), 3 * Math.min(k + 1, count - 1)];
-    const [tx, ty, tz] = [m[after] - m[before], m[after + 1] - m[before + 1], m[after + 2] - m[before + 2]];
-    const [rx, ry, rz] = [m[3 * k] - eye.x, m[3 * k + 1] - eye.y, m[3 * k + 2] - eye.z];
-    const [cx, cy, cz] = [ty * rz - tz * ry, tz * rx - tx * rz, tx * ry - ty * rx];
-    const factor = width / (Math.hypot(cx, cy, cz) || 1);
-    const [x, y, z] = [m[3 * k], m[3 * k + 1], m[3 * k + 2]];
-    position.set([x - cx * factor, y - cy * factor, z - cz * factor, x + cx * factor, y + cy * factor, z + cz * factor], 6 * k);
-  }
+    return kept.slice(0, -1);
+  };
+  const sorted = Array.from({ length: line.length / 4 }, (_, k) => [line[4 * k], line[4 * k + 1]]).sort((a, b) => a[0] - b[0] || a[1] - b[1]);
+  const hull = [...half(sorted), ...half(sorted.reverse())];
+  const area = hull.reduce((sum, [x, y], k) => sum + x * hull.at(k - 1)[1] - hull.at(k - 1)[0] * y, 0) / 2;
+  return Math.abs(area) < 4 * length ? hull : null;
 }
