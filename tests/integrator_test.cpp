@@ -6,7 +6,7 @@
 #include <pendula/explicit/system_forward_dynamics.hpp>
 #include <pendula/gauss/lagrangian_solver.hpp>
 #include <pendula/gauss/stepper.hpp>
-#include <pendula/gauss/velocity_newton.hpp>
+#include <pendula/gauss/velocity_form.hpp>
 #include <pendula/run/chain_subject.hpp>
 
 #include "support/kernels.hpp"
@@ -344,7 +344,7 @@ void expect_an_untouched_state_where_no_part_converges(const Model& model) {
 TEST(Failure, LeavesTheStateAndSaysHowFarItCame) {
   const auto system = system_of<kernels::Planar2>(equal_chain<Planar>(2));
   expect_an_untouched_state_where_no_part_converges<LagrangianSolver<4>>(system);
-  expect_an_untouched_state_where_no_part_converges<VelocityNewton<4>>(system);
+  expect_an_untouched_state_where_no_part_converges<LagrangianSolver<4, VelocityForm>>(system);
   expect_an_untouched_state_where_no_part_converges<ChainSolver<Planar, 2>>(equal_chain<Planar>(2));
 }
 

@@ -2,7 +2,7 @@
 
 #include <pendula/gauss/gauss_integrator.hpp>
 #include <pendula/gauss/lagrangian_solver.hpp>
-#include <pendula/gauss/velocity_newton.hpp>
+#include <pendula/gauss/velocity_form.hpp>
 
 #include "library/explicit_methods.hpp"
 
@@ -10,11 +10,13 @@ namespace pendula {
 namespace {
 
 /// An implicit method, with the narrowest pack that holds its stages.
-template <template <int> class OfWidth, class... SolverOptions>
+template <class Equations>
 std::unique_ptr<PlainIntegrator> make_gauss(const SystemModel& model, const RunOptions& options,
-                                            const GaussDescription& described, const SolverOptions&... solver_options) {
+                                            const GaussDescription& described) {
+  require_stages(options.stages);
   const auto make = [&]<int width>() -> std::unique_ptr<PlainIntegrator> {
-    return std::make_unique<GaussIntegrator<OfWidth<width>>>(model, options, described, solver_options...);
+    return std::make_unique<GaussIntegrator<LagrangianSolver<width, Equations>>>(
+        model, options, described, options.iteration, family_of(options.method));
   };
   if (options.stages <= 2) return make.template operator()<2>();
   return options.stages <= 4 ? make.template operator()<4>() : make.template operator()<8>();
@@ -29,13 +31,9 @@ std::unique_ptr<PlainIntegrator> make_system_integrator(const SystemTable& table
   const auto coordinates = static_cast<int>(model.coordinates());
   if (parts == 0) parts = coordinates;
   const GaussDescription described{"dense", table.info.name, parts};
-  const Family family = family_of(options.method);
-  require_stages(options.stages);
-  if (options.form == Form::velocity) {
-    require_newton(options.iteration);
-    return make_gauss<VelocityNewton>(model, options, described, family);
-  }
-  return make_gauss<LagrangianSolver>(model, options, described, options.iteration, family);
+  if (options.form == Form::momentum) return make_gauss<MomentumForm>(model, options, described);
+  require_newton(options.iteration);
+  return make_gauss<VelocityForm>(model, options, described);
 }
 
 }  // namespace pendula

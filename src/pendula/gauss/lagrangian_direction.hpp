@@ -18,7 +18,7 @@ namespace pendula {
 template <int Width>
 class LagrangianDirection {
  public:
-  using Stages = LagrangianStages<Width>;
+  using Stages = LagrangianStages<Width, MomentumForm>;
   using Jacobians = LagrangianJacobians<Width>;
 
   explicit LagrangianDirection(std::size_t coordinates)
@@ -33,7 +33,7 @@ class LagrangianDirection {
   void linearize(const Stages& stages) {
     for (std::size_t k = 0; k < count_; ++k) {
       weights_[k] = stages.weight(k);
-      weights_[count_ + k] = stages.inverse_weight(k);
+      weights_[count_ + k] = stages.push_weight(k);
     }
     has_rates_ = false;
   }

@@ -13,10 +13,10 @@ namespace pendula {
 /// What stages of a step do not see of the field between them: its rates are summed along the polynomials through the
 /// stages, where functions of the model may be narrow. Of smooth ones the sum is that of the stages, to the order of
 /// the method.
-template <int Width>
+template <int Width, class Form>
 class LagrangianField {
  public:
-  using Stages = LagrangianStages<Width>;
+  using Stages = LagrangianStages<Width, Form>;
 
   LagrangianField(const SystemModel& model, int stages)
       : at_(model),
@@ -33,7 +33,7 @@ class LagrangianField {
     stages.see_speed();
     const auto arguments = [&](std::span<const double> shares, double* found) {
       in_lanes(stages, shares, found, arguments_, [&] {
-        at_(&SystemFunctions::velocity_from_momentum, there_[0], there_[count_], found_[arguments_]);
+        Form::rates(at_, count_ * width, there_[0], there_[count_], found_[arguments_]);
         at_(&SystemFunctions::call_arguments, there_[0], found_[arguments_], found_[0]);
       });
     };
@@ -41,7 +41,7 @@ class LagrangianField {
     const double pace = stages.shape().pace;
     const auto rates = [&](std::span<const double> shares, double* found) {
       in_lanes(stages, shares, found, 2 * count_,
-               [&] { at_(&SystemFunctions::hamiltonian_form, there_[0], there_[count_], found_[0], found_[count_]); });
+               [&] { Form::field(at_, count_ * width, there_[0], there_[count_], found_[0], found_[count_]); });
     };
     look_.sum(rates, {sums_, moments_, missed_});
     stages.take_changes(sums_, moments_);
@@ -76,7 +76,7 @@ class LagrangianField {
   SystemAt<Width> at_;
   FieldLook look_;
   std::size_t count_, arguments_;
-  typename Stages::Rows there_, found_;  // coordinates and momenta; what is found there
+  typename Stages::Rows there_, found_;  // the state at some shares of the step; what is found there
   std::vector<double> sums_, moments_, missed_;
 };
 

@@ -2,16 +2,19 @@
 
 #include <cstddef>
 #include <pendula/gauss/lagrangian_stages.hpp>
+#include <pendula/gauss/momentum_form.hpp>
+#include <pendula/numeric/compensated.hpp>
 
 namespace pendula {
 
-/// What the kernel's generated Jacobians make of the stage equations of any system in momentum form: p and f at the
-/// stages and their derivatives, all stages of one number in the lanes of a pack, and the exact matrix of the equations
-/// for the stage rates V (lagrangian_newton.hpp).
+/// The stage equations of Newton in momentum form, for the stage rates V_i, by the kernel's generated Jacobians:
+///   Q_i = q + h Σ_j a_ij V_j,  f_j = ∂L/∂q(Q_j, V_j) + Q(Q_j, V_j, t_j),
+///   residual  ∂L/∂v(Q_i, V_i) − p − h Σ_j a_ij f_j.
+/// p and f at the stages and their derivatives have all stages of one number in the lanes of a pack.
 template <int Width>
 class LagrangianJacobians {
  public:
-  using Stages = LagrangianStages<Width>;
+  using Stages = LagrangianStages<Width, MomentumForm>;
   using L = typename Stages::L;
   using Rows = typename Stages::Rows;
 
@@ -30,17 +33,29 @@ class LagrangianJacobians {
     }
   }
 
-  /// Evaluates p and f at the stages.
-  void evaluate_forms(const Stages& stages) {
-    place(stages);
-    stages.at_stages()(&SystemFunctions::momentum_form, q(), v(), vector(2), vector(3));
-  }
-
   /// Evaluates p, f and their derivatives at the stages.
   void evaluate(const Stages& stages) {
     place(stages);
     stages.at_stages()(&SystemFunctions::momentum_form_with_jacobians, q(), v(), vector(2), vector(3), matrix(0),
                        matrix(1), matrix(2), matrix(3));
+  }
+
+  /// Evaluates the equations of Newton and their derivatives at the stages.
+  void linearize(Stages& stages) {
+    evaluate(stages);
+    push(stages);
+  }
+
+  /// Computes the increments of the momenta from the rates as they are.
+  void follow(Stages& stages) {
+    place(stages);
+    stages.at_stages()(&SystemFunctions::momentum_form, q(), v(), vector(2), vector(3));
+    push(stages);
+  }
+
+  L residual(const Stages& stages, std::size_t row) const {
+    const Compensated<double>& before = stages.momentum_before(row);
+    return (p(row) - L(before.value)) - stages.columns().integral(stages.pushed(row), L(before.compensation));
   }
 
   const double* q() const { return vectors_[0]; }
@@ -60,6 +75,10 @@ class LagrangianJacobians {
   }
 
  private:
+  void push(Stages& stages) const {
+    for (std::size_t k = 0; k < count_; ++k) (stages.columns().hb() * f(k)).store(stages.pushed(k));
+  }
+
   double* vector(std::size_t which) { return vectors_[which * count_]; }
   double* matrix(std::size_t which) { return matrices_[which * count_ * count_]; }
   const double* entry(std::size_t which, std::size_t i, std::size_t j) const {

@@ -7,6 +7,7 @@
 #include <pendula/gauss/lagrangian_newton.hpp>
 #include <pendula/gauss/lagrangian_stages.hpp>
 #include <pendula/gauss/lagrangian_tangent.hpp>
+#include <pendula/gauss/momentum_form.hpp>
 #include <pendula/gauss/roundoff.hpp>
 #include <pendula/gauss/stage_iterations.hpp>
 #include <pendula/gauss/stage_solver.hpp>
@@ -20,12 +21,11 @@
 
 namespace pendula {
 
-/// A StageSolver for any system in momentum form, q̇ = v, ṗ = ∂L/∂q + Q, p = ∂L/∂v, over its generated kernel, so that
-/// Gauss methods are symplectic. It solves by exact Newton, by fixed point, or by whichever takes less; up to `Width`
-/// stages: 2, 4 or 8.
-template <int Width = max_stages>
-class LagrangianSolver : public StageIterations<LagrangianStages<Width>> {
-  using Base = StageIterations<LagrangianStages<Width>>;
+/// A StageSolver for any system over its generated kernel, in MomentumForm or VelocityForm. It solves by exact Newton;
+/// in momentum form also by fixed point, or by whichever takes less. Up to `Width` stages: 2, 4 or 8.
+template <int Width = max_stages, class Form = MomentumForm>
+class LagrangianSolver : public StageIterations<LagrangianStages<Width, Form>> {
+  using Base = StageIterations<LagrangianStages<Width, Form>>;
 
  public:
   using Model = SystemModel;
@@ -35,14 +35,15 @@ class LagrangianSolver : public StageIterations<LagrangianStages<Width>> {
   /// Throws std::invalid_argument unless the method has so many stages, at most Width.
   LagrangianSolver(const Model& model, int stages, Iteration iteration = Iteration::automatic,
                    Family family = Family::gauss)
-      : Base(iteration, newton_cost(model, stages), model, checked(stages), family),
+      : Base(Form::has_fixed_point ? iteration : Iteration::newton, newton_cost(model, stages), model, checked(stages),
+             family),
         family_(family),
         newton_(model.coordinates(), stages),
         forcing_(model, family, stages),
         field_(model, stages),
         // Where lengths change, the motion may be singular between the stages, which is never so where all coordinates
-        // are angles: energy tells. Where something depends on time, energy is not conserved.
-        may_miss_(family != Family::radau && !model.info().depends_on_time &&
+        // are angles: energy tells. It is not conserved where something depends on time, nor by velocity form.
+        may_miss_(Form::is_symplectic && family != Family::radau && !model.info().depends_on_time &&
                   !std::ranges::all_of(model.info().is_angle, std::identity())) {}
 
   /// Throws std::invalid_argument on another number of coordinates.
@@ -53,21 +54,21 @@ class LagrangianSolver : public StageIterations<LagrangianStages<Width>> {
 
   Correction correct() {
     const Correction correction = Base::correct(newton_, coordinates());
-    forces_are_found_ = correction.convergence == Convergence::linear;
+    is_complete_ = correction.convergence == Convergence::linear;
     return correction;
   }
 
   int part_of(Status status) {
     if (status == Status::singular_mass_matrix) return stages_.singular_coordinate();
     if (status == Status::wrong_root) return stages_.turning_coordinate();
-    return last_.part >= 0 ? last_.part : stages_.most_changing_coordinate();
+    return last_.part >= 0 || !Form::has_fixed_point ? last_.part : stages_.most_changing_coordinate();
   }
 
   double turn() const { return stages_.turn(); }
   StepShape shape() {
     StepShape shape = stages_.shape();
     if (may_miss_) {
-      find_forces();
+      complete();
       shape.imbalance = stages_.imbalance();
     }
     return shape;
@@ -75,7 +76,7 @@ class LagrangianSolver : public StageIterations<LagrangianStages<Width>> {
   /// What forces do between the stages that were solved.
   Unseen unseen() {
     if (!has_to_look()) return {};
-    find_forces();
+    complete();
     return field_.unseen(stages_);
   }
   double followed(double time, double h, double tolerance) {
@@ -92,13 +93,13 @@ class LagrangianSolver : public StageIterations<LagrangianStages<Width>> {
         model.loaded(), model.damped(), family_ == Family::radau};
   }
   double energy_defect() {
-    find_forces();
+    complete();
     return stages_.energy_defect();
   }
 
   double accept() {
+    complete();
     const double brought = stages_.brought();
-    find_forces();
     choice_.end_step();
     stages_.accept();
     return brought;
@@ -106,7 +107,7 @@ class LagrangianSolver : public StageIterations<LagrangianStages<Width>> {
 
   /// The derivative of the step that was solved and not yet accepted.
   using Tangent = LagrangianTangent<Width>;
-  Tangent make_tangent() const { return Tangent(stages_); }
+  Tangent make_tangent() const requires Form::is_symplectic { return Tangent(stages_); }
   void linearize(Tangent& tangent) const { tangent.linearize(stages_); }
 
  private:
@@ -128,18 +129,18 @@ class LagrangianSolver : public StageIterations<LagrangianStages<Width>> {
 
   bool has_to_look() const { return !stages_.info().argument_is_base.empty(); }
 
-  // After Newton, the forces are those at the rates before its last correction.
-  void find_forces() {
-    if (!forces_are_found_) newton_.find_forces(stages_);
-    forces_are_found_ = true;
+  // After Newton, what follows from its unknowns is that of those before its last correction.
+  void complete() {
+    if (!is_complete_) newton_.follow(stages_);
+    is_complete_ = true;
   }
 
   Family family_;
-  LagrangianNewton<Width> newton_;
+  LagrangianNewton<Width, Form> newton_;
   SystemForcing forcing_;
-  LagrangianField<Width> field_;
+  LagrangianField<Width, Form> field_;
   bool may_miss_;
-  bool forces_are_found_ = true;
+  bool is_complete_ = true;
 };
 
 }  // namespace pendula

@@ -21,12 +21,12 @@
 
 namespace pendula {
 
-/// State and stages of one motion of any system in momentum form (SystemMotion), as both iterations see them. All
-/// stages of one number are in the lanes of a pack. `Width` is at least the number of stages, which is a run-time
-/// number: lanes beyond it repeat the start of the step.
-template <int Width>
-class LagrangianStages : public SystemMotion<StagesInLanes<Eigen::Dynamic, double, Width>, StageDynamics<Width>> {
-  using Base = SystemMotion<StagesInLanes<Eigen::Dynamic, double, Width>, StageDynamics<Width>>;
+/// State and stages of one motion of any system (SystemMotion), as both iterations see them. All stages of one number
+/// are in the lanes of a pack. `Width` is at least the number of stages, which is a run-time number: lanes beyond it
+/// repeat the start of the step.
+template <int Width, class Form>
+class LagrangianStages : public SystemMotion<StagesInLanes<Eigen::Dynamic, double, Width>, StageDynamics<Width>, Form> {
+  using Base = SystemMotion<StagesInLanes<Eigen::Dynamic, double, Width>, StageDynamics<Width>, Form>;
 
  public:
   using L = Pack<Width, RegisterFor<Width>>;
@@ -57,7 +57,7 @@ class LagrangianStages : public SystemMotion<StagesInLanes<Eigen::Dynamic, doubl
     const SystemAt<1>& here = dynamics_.at(time);
     pace_.start(here, q, v);
     masses_.start(here, q);
-    here(&SystemFunctions::momentum_from_velocity, q, v, room(3));
+    Form::from_rates(here, count_, q, v, room(3));
     for (std::size_t k = 0; k < count_; ++k) Base::start(0, k, q[k], room(3)[k]);
     see_masses();
     return masses_.singular() < 0 ? Status::ok : Status::singular_mass_matrix;
@@ -135,7 +135,7 @@ class LagrangianStages : public SystemMotion<StagesInLanes<Eigen::Dynamic, doubl
         [&](std::size_t j) { return static_cast<int>(j) < stages() ? time_of(static_cast<int>(j)) : time_; });
     Base::predict(time_, ratio, from);
     floor_ = Base::invisible * std::sqrt(Base::size_squared_);
-    for (std::size_t k = 0; k < count_; ++k) weights_[count_ + k] = std::abs(task.h) / weight(k);
+    for (std::size_t k = 0; k < count_; ++k) weights_[count_ + k] = Form::size(std::abs(task.h), weight(k));
   }
 
   /// Predicts the stages as if the motion went on as it does at the start of the step.
@@ -144,7 +144,7 @@ class LagrangianStages : public SystemMotion<StagesInLanes<Eigen::Dynamic, doubl
     prediction_.forget();
   }
 
-  /// One fixed-point iteration; its change, relative to the size of the step.
+  /// One fixed-point iteration, in momentum form; its change, relative to the size of the step.
   double iterate() {
     const IterationChange found = at_stages()(
         &SystemFunctions::iterate,
@@ -193,23 +193,29 @@ class LagrangianStages : public SystemMotion<StagesInLanes<Eigen::Dynamic, doubl
     for (std::size_t k = 0; k < count_; ++k) {
       double later = 0;
       for (int j = 0; j < stages(); ++j) later += (1 - columns_.c(static_cast<std::size_t>(j))) * pushed(k)[j];
-      const double displaced = h() * (h() * moments[count_ + k] - later) / (weight(k) * weight(k));
+      const double displaced = Form::size(h() * (h() * moments[count_ + k] - later), weight(k)) / weight(k);
       sums[k] = h() * sums[k] - total(k) + displaced;
       sums[count_ + k] = h() * sums[count_ + k] - total(count_ + k);
     }
   }
   double h() const { return prediction_.h(); }
 
-  /// h b v of coordinate k, h b f of its momentum.
-  double* moved(std::size_t k) { return U_[k].numbers(); }
-  double* pushed(std::size_t k) { return U_[count_ + k].numbers(); }
+  /// h b v of coordinate k (which = 0), h b f of its momentum (1).
+  double* increments(int which, std::size_t k) { return U_[static_cast<std::size_t>(which) * count_ + k].numbers(); }
+  double* moved(std::size_t k) { return increments(0, k); }
+  double* pushed(std::size_t k) { return increments(1, k); }
   const double* moved(std::size_t k) const { return U_[k].numbers(); }
   const double* pushed(std::size_t k) const { return U_[count_ + k].numbers(); }
 
   /// √M_kk at the start of the step.
   double weight(std::size_t k) const { return weights_[k]; }
-  /// h over that.
-  double inverse_weight(std::size_t k) const { return weights_[count_ + k]; }
+  /// The same for changes of its momentum, times h.
+  double push_weight(std::size_t k) const { return weights_[count_ + k]; }
+  /// Size of an increment, as √M_kk dq_k.
+  double size(int which, std::size_t k, double increment) const {
+    if (which == 0) return weight(k) * std::abs(increment);
+    return Form::size(std::abs(h() * increment), weight(k));
+  }
   /// The least that a correction is compared with: what would round the coordinates.
   double floor() const { return floor_; }
 
@@ -305,7 +311,7 @@ class LagrangianStages : public SystemMotion<StagesInLanes<Eigen::Dynamic, doubl
   double size_of(std::span<const double> changes, double pace) const {
     double places = 0, pushes = 0;
     for (std::size_t k = 0; k < count_; ++k) {
-      const double shift = weight(k) * changes[k], push = changes[count_ + k] / weight(k);
+      const double shift = weight(k) * changes[k], push = Form::size(changes[count_ + k], weight(k));
       places += shift * shift;
       pushes += push * push;
     }
@@ -364,7 +370,7 @@ class LagrangianStages : public SystemMotion<StagesInLanes<Eigen::Dynamic, doubl
     for (std::size_t k = 0; k < count_; ++k) weights_[k] = std::sqrt(masses_.inertia(k));
   }
 
-  std::vector<double> weights_;  // √M_kk, then h over that
+  std::vector<double> weights_;  // √M_kk; then that of changes of momenta, times h
   double floor_ = 0, most_kinetic_ = 0;
   StepPrediction prediction_;
 };

@@ -27,7 +27,7 @@ template <int Width>
 class LagrangianTangent {
  public:
   using Real = double;
-  using Stages = LagrangianStages<Width>;
+  using Stages = LagrangianStages<Width, MomentumForm>;
 
   explicit LagrangianTangent(const Stages& stages)
       : columns_(stages.columns()),

@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <limits>
 #include <pendula/gauss/member_layout.hpp>
+#include <pendula/gauss/momentum_form.hpp>
 #include <pendula/gauss/stage_tangents.hpp>
 #include <pendula/gauss/step_shape.hpp>
 #include <pendula/gauss/system_motion.hpp>
@@ -23,8 +24,9 @@ namespace pendula {
 /// Systems of one kernel, one in each lane, and the stages of a Gauss step of theirs (SystemMotion). With a tangent of
 /// each member (StageTangents), whose stages are solved after the motion's.
 template <int S, class Register = MemberRegister, bool with_tangent = false>
-class SystemMembers : public SystemMotion<MembersInLanes<S, LanePack<Register>>, MemberSystems<LanePack<Register>>&> {
-  using Base = SystemMotion<MembersInLanes<S, LanePack<Register>>, MemberSystems<LanePack<Register>>&>;
+class SystemMembers
+    : public SystemMotion<MembersInLanes<S, LanePack<Register>>, MemberSystems<LanePack<Register>>&, MomentumForm> {
+  using Base = SystemMotion<MembersInLanes<S, LanePack<Register>>, MemberSystems<LanePack<Register>>&, MomentumForm>;
 
  public:
   using L = LanePack<Register>;

@@ -18,17 +18,17 @@
 
 namespace pendula {
 
-/// Coordinates, momenta and stages of any system that moves by Gauss steps in momentum form, q̇ = v(q, p), ṗ = f(q, v);
-/// of one motion (StagesInLanes) or of several members (MembersInLanes): what both share. `DynamicsType` calls the
-/// functions of the system: here(time, function, numbers…) where motions are, and call(times, function, numbers…) at
-/// stages.
+/// Coordinates, momenta and stages of any system that moves by Gauss steps, q̇ = v(q, p), ṗ = f(q, v) (MomentumForm; in
+/// VelocityForm rates have the place of momenta); of one motion (StagesInLanes) or of several members (MembersInLanes):
+/// what both share. `DynamicsType` calls the functions of the system: here(time, function, numbers…) where motions are,
+/// and call(times, function, numbers…) at stages.
 ///
 /// Stages are held as increments, h b v of a coordinate and h b f of its momentum; the state carries what it has lost
 /// to rounding:
 ///   Q = q + m U_q,  P = p + m U_p,  m_ij = a_ij / b_j.
 ///
 /// Coordinates may have any units. Changes of them are compared as √M_kk dq_k, and those of momenta as dp_k / √M_kk.
-template <class LayoutType, class DynamicsType>
+template <class LayoutType, class DynamicsType, class Form>
 class SystemMotion {
  public:
   using Layout = LayoutType;
@@ -182,7 +182,14 @@ class SystemMotion {
   }
   void find_rates(const Num& time) const {
     write_state();
-    dynamics_.here(time, &SystemFunctions::velocity_from_momentum, room(0), room(1), room(2));
+    rates_of_room(time);
+  }
+  void rates_of_room(const Num& time) const {
+    Form::rates(at(time), count_ * width_of<Num>, room(0), room(1), room(2));
+  }
+  // Calls functions of the system where motions are.
+  auto at(const Num& time) const {
+    return [this, &time](auto function, auto... numbers) { dynamics_.here(time, function, numbers...); };
   }
   Num rate(std::size_t k) const { return from_row<Num>(room(2, k)); }
 
@@ -198,7 +205,7 @@ class SystemMotion {
     const auto end = [&](std::size_t k) { return (state_[k].compensation + Columns::total(U_[k])) + state_[k].value; };
     for (std::size_t k = 0; k < 2 * count_; ++k) to_row(Num(end(k)), room(0, k));
     const Num then = time_ + columns_.h();
-    dynamics_.here(then, &SystemFunctions::velocity_from_momentum, room(0), room(1), room(2));
+    rates_of_room(then);
     return {brought, start, energies(then)};
   }
 
@@ -225,7 +232,7 @@ class SystemMotion {
   void start_cold(const Mask& cold) {
     const auto& columns = columns_.at_hand();
     write_state();
-    dynamics_.here(time_, &SystemFunctions::hamiltonian_form, room(0), room(1), room(2), room(3));
+    Form::field(at(time_), count_ * width_of<Num>, room(0), room(1), room(2), room(3));
     for (std::size_t k = 0; k < 2 * count_; ++k) {
       const auto slope = Layout::spread(from_row<Num>(room(2, k)));  // v, and f after it
       each_cell([&](auto j) {
