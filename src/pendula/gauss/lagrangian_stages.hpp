@@ -315,12 +315,13 @@ class LagrangianStages : public SystemMotion<StagesInLanes<Eigen::Dynamic, doubl
       places += shift * shift;
       pushes += push * push;
     }
-    return std::sqrt((pace * pace * places + pushes) / Base::fastest());
+    const double squared = pace * pace * places + pushes;
+    return squared > 0 ? std::sqrt(squared / Base::fastest()) : squared;  // nothing, of a motion at rest; or no number
   }
   /// Finds how fast the solved stages are.
   void see_speed() { Base::find_speeds(); }
   /// How fast the fastest stage is, relative to the speed of the motion.
-  double speed_here() const { return std::sqrt(fastest_here_ / Base::fastest()); }
+  double speed_here() const { return fastest_here_ > 0 ? std::sqrt(fastest_here_ / Base::fastest()) : 0; }
 
   /// A coordinate whose inertia vanished where masses were looked at last; −1 where none did.
   int singular_coordinate() const { return masses_.singular(); }
