@@ -176,9 +176,9 @@ TYPED_TEST(Taylor, OfManyInLanesIsThatOfOne) {
       }
       EXPECT_EQ(found[k].statistics.steps, expected.statistics.steps);
       EXPECT_EQ(found[k].statistics.rejected_steps, expected.statistics.rejected_steps);
-      // Of rates near poles, too; measured 4e-15 and 2.8e-13: the last step is cut by another rounding.
-      EXPECT_LT((found[k].last.q - expected.last.q).cwiseAbs().maxCoeff(), 4e-14) << links << ", " << k;
-      EXPECT_LT((found[k].last.v - expected.last.v).cwiseAbs().maxCoeff(), 3e-12) << links << ", " << k;
+      // Of rates near poles, too; measured 3.1e-13 and 3.1e-11: one alone keeps the rounding errors of its sums.
+      EXPECT_LT((found[k].last.q - expected.last.q).cwiseAbs().maxCoeff(), 3e-12) << links << ", " << k;
+      EXPECT_LT((found[k].last.v - expected.last.v).cwiseAbs().maxCoeff(), 3e-10) << links << ", " << k;
     }
   }
 }

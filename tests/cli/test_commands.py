@@ -71,7 +71,8 @@ def test_check_of_a_kernel_that_is_not_there(pendula):
 
 @pytest.mark.parametrize("command", [["lab"], ["export", "--as", "c"], ["build"], ["describe"]])
 def test_a_name_that_is_no_model_is_wrong_input(command, pendula):
-    run = pendula(*command, "nosuch", *(["-o", "out"] if command[0] in ("lab", "export") else []))
+    output = {"lab": ["-o", "out.html"], "export": ["-o", "out"]}.get(command[0], [])
+    run = pendula(*command, "nosuch", *output)
     assert (
         run.status == 2 and "expected a model file ending in .py, or a built-in model: cart_chain" in run.err
     )

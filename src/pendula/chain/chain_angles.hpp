@@ -20,9 +20,10 @@ class ChainAngles {
   /// Of rods of these lengths.
   template <class Lengths>
   explicit ChainAngles(const Lengths& lengths)
-      : links_(static_cast<std::size_t>(lengths.size())), now_(links_), before_(now_) {
-    for (const double length : lengths) inverse_lengths_.push_back(1 / length);
-  }
+      : links_(static_cast<std::size_t>(lengths.size())),
+        lengths_(lengths.begin(), lengths.end()),
+        now_(links_),
+        before_(now_) {}
 
   /// Of rods ξ_i = along(i) that are at angles q.
   template <class Along>
@@ -84,7 +85,7 @@ class ChainAngles {
     const auto there = along(i, share);
     double squared = 0;
     for (std::size_t k = 0; k < there.size(); ++k) {
-      const double moved = inverse_lengths_[at(i)] * there[k] - anchor.direction()[k];
+      const double moved = there[k] / lengths_[at(i)] - anchor.direction()[k];
       squared += moved * moved;
     }
     if (!(squared > anchor.reach_squared())) return;
@@ -107,11 +108,11 @@ class ChainAngles {
     using Wide = LongReal;
     Wide squared = 0;
     for (const Wide x : rod) squared += x * x;
-    const Wide inverse = 1 / std::sqrt(squared);
+    const Wide inverse = 1 / std::sqrt(squared), length = lengths_[i];
     Heading<Space, Wide> heading;
     for (std::size_t k = 0; k < heading.u.size(); ++k) {
       heading.u[k] = inverse * rod[k];
-      heading.u_dot[k] = inverse * rate[k];
+      heading.u_dot[k] = rate[k] / length;
     }
     std::array<Wide, dof> near;
     for (std::size_t a = 0; a < dof; ++a) near[a] = known[a];
@@ -123,7 +124,7 @@ class ChainAngles {
   }
 
   std::size_t links_;
-  std::vector<double> inverse_lengths_;
+  std::vector<double> lengths_;
   std::vector<Anchor> now_, before_;  // before_: where the last step began
 };
 
