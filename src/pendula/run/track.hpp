@@ -27,19 +27,21 @@ class FastPlaces {
     size_of_v_ = start.v.cwiseAbs();
   }
 
-  /// Call after every step, with its end.
-  void follow(const Motion& now) {
+  /// Call after every step.
+  void follow(const StepView& step) {
+    step.read_state(now_);
+    const Motion& now = now_;
     size_of_q_ = size_of_q_.cwiseMax(now.q.cwiseAbs());
     size_of_v_ = size_of_v_.cwiseMax(now.v.cwiseAbs());
     const double h = now.time - before_.time;
     const double change = std::max(largest(now.q, before_.q, size_of_q_), largest(now.v, before_.v, size_of_v_));
     const double speed = h > 0 ? change / h : 0;
-    before_ = now;
     if (steps_++ % stretch_ == 0) {
       places_.push_back({now, speed});
     } else if (speed > places_.back().speed) {
       places_.back() = {now, speed};
     }
+    std::swap(before_, now_);
     if (places_.size() == most_ && steps_ % stretch_ == 0) join_pairs();
   }
 
@@ -77,7 +79,7 @@ class FastPlaces {
 
   std::size_t most_ = 2;
   std::int64_t steps_ = 0, stretch_ = 1;
-  Motion before_;
+  Motion before_, now_;
   Eigen::VectorXd size_of_q_, size_of_v_;
   std::vector<FastPlace> places_;
 };
@@ -145,7 +147,7 @@ class Track {
   /// Call after every step. `end` is the state at which the run ended within it, if it did.
   void follow(StepView& step, const std::optional<Motion>& end) {
     ++steps_;
-    if (has_fast_places_ && !end) places_.follow(step.state());
+    if (has_fast_places_ && !end) places_.follow(step);
     if (!looks()) return count_step(step);
     const double last = end ? end->time : step.time();
     while (states_.size() < times_.size() && times_[states_.size()] <= last) {

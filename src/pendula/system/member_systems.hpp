@@ -60,14 +60,20 @@ class MemberSystems {
     call(now_[0], function, numbers...);
   }
 
-  /// Computes the Taylor series of motions about the states in the first row of `rows.state`, up to t^order. `inputs`
-  /// has (order + 1) rows of each input.
-  void expand(const L& time, const L& unit, int order, PackRows<width_of<L>>& inputs, const SeriesRows& rows) {
+  /// Computes orders 0 to `last` of the Taylor series of motions about the states in the first row of `rows.state`.
+  /// `inputs` gets (order + 1) rows of each input.
+  void begin_series(const L& time, const L& unit, int order, int last, PackRows<width_of<L>>& inputs,
+                    const SeriesRows& rows) {
     to_row(time, now_[0]);
-    const Conditions there = at(now_[0]);
-    functions_.series_start(there, rows);
+    functions_.series_start(at(now_[0]), rows);
     inputs_.series(time, unit, order, inputs);
-    functions_.series_next({there.context, there.parameters, there.times, inputs[0]}, rows, 1, order - 1);
+    end_series(time, 1, last, inputs, rows);
+  }
+  /// Computes orders `first` to `last` of series that have begun.
+  void end_series(const L& time, int first, int last, const PackRows<width_of<L>>& inputs, const SeriesRows& rows) {
+    if (first > last) return;
+    to_row(time, now_[0]);
+    functions_.series_next({table_.context, parameters_[0], now_[0], inputs[0]}, rows, first, last);
   }
 
  private:

@@ -69,14 +69,11 @@ class SeriesSteps {
         look_(most_looks, 2, systems.info().argument_is_base),
         largest_defect_(0.25 * order_ * order_ * std::max(options.tolerance, 1e-15)),
         log_reach_(std::log2(std::max(options.tolerance, detail::finest_of_series)) / order_),
-        // Orders up to one that is a multiple of four, beyond the last one zero: sums are taken four by four.
-        state_((static_cast<std::size_t>(order_) + 5) * row_),
+        series_(info_, systems.info().inputs.size(), order_, row_),
+        ahead_(series_),
         moved_(row_),
         turned_(row_),
         bent_(row_),
-        kept_(static_cast<std::size_t>(info_.kept) + 1),
-        operands_(static_cast<std::size_t>(order_) * series_operand_row(info_, W) / W + 1),
-        inputs_((static_cast<std::size_t>(order_) + 1) * systems.info().inputs.size() + 1),
         now_{PackRows<W>(row_), PackRows<W>(row_), Parts(systems.coordinates())},
         trial_(now_),
         begin_(now_),
@@ -127,7 +124,7 @@ class SeriesSteps {
       now_.state[n_ + k][lane] = rate[lane];
       now_.low[k][lane] = now_.low[n_ + k][lane] = 0;
     }
-    is_expanded_ = false;
+    is_expanded_ = is_begun_ = false;
     if constexpr (!is_batch<L>) {
       if (tangent_) tangent_->forget();
     }
@@ -138,7 +135,7 @@ class SeriesSteps {
   void member(Numbers& numbers) requires(!is_batch<L>) {
     numbers(now_.state, now_.low, now_.unit, time_);
     for (int i = 0; i < count(); ++i) numbers(now_.parts[i].place, now_.parts[i].rate);
-    is_expanded_ = false;
+    is_expanded_ = is_begun_ = false;
   }
 
   std::array<LongReal, 1> exact_place(int i) const requires(!is_batch<L>) { return {sum_of(i)}; }
@@ -183,23 +180,33 @@ class SeriesSteps {
     if (!is_expanded_) expand();
     tried_ = h;
     const L tau = h / unit_;
-    L none(0.0);
     sum_all(tau, rises, moved_);
-    for (std::size_t k = 0; k < 2 * n_; ++k) {
-      const L x = from_row<L>(now_.state[k]), change = fma(tau, from_row<L>(moved_[k]), from_row<L>(now_.low[k])),
-              there = x + change;
+    for_each_part([&]<class Lanes>(std::size_t k, std::type_identity<Lanes>) {
+      const Lanes x = from_row<Lanes>(now_.state[k]),
+                  change = fma(Lanes(tau), from_row<Lanes>(moved_[k]), from_row<Lanes>(now_.low[k])),
+                  there = x + change;
       to_row(there, trial_.state[k]);
       to_row(change - (there - x), trial_.low[k]);
-      none = none + (there - there);
-    }
-    read_rates(time + h, trial_.state, trial_.parts);
-    for (int i = 0; i < count(); ++i) none = none + (trial_.parts[i].rate[0] - trial_.parts[i].rate[0]);
+    });
+    L none(0.0);
     // Near the size that its steps will have; a step that the end of a run has cut short says nothing of that.
     trial_.unit = select(longest_ <= most_growth * unit_, longest_, unit_);
+    begin(time + h, trial_.unit, trial_, ahead_);
+    is_begun_ = false;
+    for (int i = 0; i < count(); ++i) {
+      const L rate = info_.has_momenta ? ahead_.at(1, static_cast<std::size_t>(i)) / trial_.unit
+                                       : from_row<L>(trial_.state[count() + i]);
+      const L place = from_row<L>(trial_.state[i]);
+      trial_.parts[i] = {{place}, {rate}};
+      none = none + (place - place) + (rate - rate);
+    }
     Mask found = wanted & (none == L(0.0));
-    found = found & solves(time, h, L(1.0), true);
+    found = found & ends_as(h, tau);
     const bool may_be_narrow = look_.has_to_look() && any(found);
-    if (may_be_narrow) find_arguments(time + h, 2);
+    if (may_be_narrow) {
+      see(tau, true);
+      find_arguments(time + h, 2);
+    }
     const Mask is_far = found & goes_far();
     for (int k = 1; k < looks && any(found & is_far); ++k) {
       found = found & (solves(time, h, L(static_cast<double>(k) / looks)) | !is_far);
@@ -251,6 +258,7 @@ class SeriesSteps {
     time_ = select(which, time_ + tried_, time_);
     step_ = select(which, tried_, step_);
     is_expanded_ = false;
+    is_begun_ = all(which);
   }
 
   /// From now on steps keep their derivative; nothing where the kernel has none.
@@ -322,6 +330,25 @@ class SeriesSteps {
   static constexpr double far_turn = 0.5, far_way = 0.25;  // rad; of the largest length
   static constexpr double most_turn = 3;                   // rad within a step, so that it is not from hill to hill
 
+  /// A series of a motion, with what its kernel keeps for it.
+  struct Series {
+    // Orders up to one that is a multiple of four, beyond the last one zero: sums are taken four by four.
+    Series(const SeriesInfo& info, std::size_t system_inputs, int order, std::size_t row_length)
+        : row(row_length),
+          state((static_cast<std::size_t>(order) + 5) * row),
+          kept(static_cast<std::size_t>(info.kept) + 1),
+          operands(static_cast<std::size_t>(order) * series_operand_row(info, W) / W + 1),
+          inputs((static_cast<std::size_t>(order) + 1) * system_inputs + 1) {}
+
+    L at(std::size_t order, std::size_t k) const { return from_row<L>(state[order * row + k]); }
+    SeriesRows rows(double* unit) {
+      return {.unit = unit, .state = state[0], .kept = kept[0], .operands = operands[0]};
+    }
+
+    std::size_t row;
+    PackRows<W> state, kept, operands, inputs;
+  };
+
   Motion motion_of(const Parts& parts, double time) const requires(!is_batch<L>) {
     Motion motion{time, Eigen::VectorXd(count()), Eigen::VectorXd(count())};
     for (int i = 0; i < count(); ++i) {
@@ -350,7 +377,7 @@ class SeriesSteps {
 
   LongReal sum_of(int k) const { return static_cast<LongReal>(*now_.state[k]) + *now_.low[k]; }
 
-  L coefficient(std::size_t order, std::size_t k) const { return from_row<L>(state_[order * row_ + k]); }
+  L coefficient(std::size_t order, std::size_t k) const { return series_.at(order, k); }
 
   /// Σ term(k+1) τ^k, in four strands that do not wait for one another.
   template <class Lanes, class Term>
@@ -401,24 +428,23 @@ class SeriesSteps {
     const auto add = [&]<class Lanes>(const Lanes& at, std::size_t first, std::type_identity<Lanes>) {
       to_row(sum(at,
                  [&](std::size_t k) {
-                   const Lanes row = from_row<Lanes>(state_[(k + which.ahead) * row_ + first]);
+                   const Lanes row = from_row<Lanes>(series_.state[(k + which.ahead) * row_ + first]);
                    if constexpr (std::is_same_v<Which, Rises>) return row;
                    return Lanes(which.weight(k)) * row;
                  }),
              to[first]);
     };
-    if constexpr (is_batch<L>) {
-      for (std::size_t k = 0; k < 2 * n_; ++k) add(tau, k, std::type_identity<L>());
-    } else {
-      for_each_part(
-          [&]<class Lanes>(std::size_t first, std::type_identity<Lanes> lanes) { add(Lanes(tau), first, lanes); });
-    }
+    for_each_part(
+        [&]<class Lanes>(std::size_t first, std::type_identity<Lanes> lanes) { add(Lanes(tau), first, lanes); });
   }
 
-  /// Calls visit(first, type) for the parts of a row of one motion's state that registers hold.
+  /// Calls visit(first, type) for the parts of a row of states that registers hold: of one motion as many numbers as
+  /// they have, of several each number of all.
   template <class Visit>
-  void for_each_part(Visit visit) const requires(!is_batch<L>) {
-    if (row_ == 4) {
+  [[gnu::always_inline]] void for_each_part(Visit visit) const {
+    if constexpr (is_batch<L>) {
+      for (std::size_t k = 0; k < row_; ++k) visit(k, std::type_identity<L>());
+    } else if (row_ == 4) {
       visit(0, std::type_identity<Pack<4, RegisterFor<4>>>());
     } else {
       for (std::size_t k = 0; k < row_; k += 8) visit(k, std::type_identity<Pack<8, RegisterFor<8>>>());
@@ -464,11 +490,24 @@ class SeriesSteps {
 
   /// Whether accelerations at a fraction of the step are those of the series, but for what terms beyond its order may
   /// add, and for the rounding of coordinates: where a motion dies away far from 0, nothing else is left.
-  Mask solves(const L& time, const L& h, const L& share, bool is_summed = false) {
-    const L inverse = L(1.0) / unit_, tau = share * h * inverse;
-    see(tau, is_summed);
-    info_.has_momenta ? sum_all(tau, bends, bent_) : sum_all(tau, slopes, turned_);
+  Mask solves(const L& time, const L& h, const L& share) {
+    const L tau = share * h / unit_;
+    see(tau);
     systems_.here(fma(share, h, time), &SystemFunctions::acceleration, seen_[0], seen_[n_], rates_[0]);
+    return bends_by_rates(h, tau);
+  }
+  /// The same at the end of the step, where the next series has begun.
+  Mask ends_as(const L& h, const L& tau) {
+    const L inverse = L(1.0) / trial_.unit;
+    for (std::size_t i = 0; i < n_; ++i) {
+      to_row(info_.has_momenta ? L(2.0) * ahead_.at(2, i) * (inverse * inverse) : ahead_.at(1, n_ + i) * inverse,
+             rates_[i]);
+    }
+    return bends_by_rates(h, tau);
+  }
+  Mask bends_by_rates(const L& h, const L& tau) {
+    const L inverse = L(1.0) / unit_;
+    info_.has_momenta ? sum_all(tau, bends, bent_) : sum_all(tau, slopes, turned_);
     L farthest(0.0);
     for (std::size_t i = 0; i < n_; ++i) farthest = max(farthest, abs(coefficient(0, i)));
     Mask found(L(0.0) == L(0.0));
@@ -527,18 +566,29 @@ class SeriesSteps {
     });
   }
 
-  /// Computes the series in a unit of time near the step size, so that coefficients are neither huge nor tiny.
+  /// The orders of a series that are computed with order 0, since they give accelerations.
+  int begun_orders() const { return info_.has_momenta ? 1 : 0; }
+
+  /// Begins a series, which so has the accelerations.
+  void begin(const L& time, const L& unit, const FullState& from, Series& series) {
+    for (std::size_t k = 0; k < 2 * n_; ++k) to_row(from_row<L>(from.state[k]), series.state[k]);
+    to_row(unit, unit_row_[0]);
+    systems_.begin_series(time, unit, order_, begun_orders(), series.inputs, series.rows(unit_row_[0]));
+  }
+
+  /// Computes the series in a unit of time near the step size, so that coefficients are neither huge nor tiny. The end
+  /// of the last step may have begun it.
   void expand() {
     unit_ = now_.unit;
+    if (is_begun_) std::swap(series_, ahead_);
     for (int attempt = 0; attempt < most_units; ++attempt) {
-      for (std::size_t k = 0; k < 2 * n_; ++k) to_row(from_row<L>(now_.state[k]), state_[k]);
+      if (!std::exchange(is_begun_, false)) begin(time_, unit_, now_, series_);
       to_row(unit_, unit_row_[0]);
-      systems_.expand(time_, unit_, order_, inputs_,
-                      {.unit = unit_row_[0], .state = state_[0], .kept = kept_[0], .operands = operands_[0]});
+      systems_.end_series(time_, begun_orders() + 1, order_ - 1, series_.inputs, series_.rows(unit_row_[0]));
       longest_ = size_by_terms();
       if constexpr (!is_batch<L>) {
         if (tangent_) {
-          tangent_->expand(time_, unit_, state_[0], inputs_[0]);
+          tangent_->expand(time_, unit_, series_.state[0], series_.inputs[0]);
           longest_ = std::min(longest_, step_of(tangent_->log_radius(looked_at)));
         }
       }
@@ -552,16 +602,54 @@ class SeriesSteps {
   /// From the decay of the last terms, relative to the size of the motion; 0 if one is not finite. Several terms are
   /// used, because motions that start at rest, and symmetric ones, have only every second or fourth term.
   L size_by_terms() {
-    const int last = order_ - (info_.has_momenta ? 1 : 0);
-    L log_radius(detail::largest_log_radius);
-    Mask is_finite(L(0.0) == L(0.0));
+    const int first = order_ - looked_at + (info_.has_momenta ? 0 : 1);
     find_scales();
-    for (int k = last - looked_at + 1; k <= last; ++k) {
-      const L term = size_of_term(static_cast<std::size_t>(k));
-      is_finite = is_finite & (term <= L(std::numeric_limits<double>::max()));
-      log_radius = min(log_radius, L(-1.0 / k) * log2_near(max(term, L(detail::almost_zero))));
+    std::array<L, looked_at> terms;
+    const Mask are_finite = find_terms(static_cast<std::size_t>(first), terms);
+    L log_radius(detail::largest_log_radius);
+    for (int k = 0; k < looked_at; ++k) {
+      const L& term = terms[static_cast<std::size_t>(k)];
+      log_radius = min(log_radius, L(-1.0 / (first + k)) * log2_near(max(term, L(detail::almost_zero))));
     }
-    return select(is_finite, min(step_of(log_radius), longest_turn()), L(0.0));
+    return select(are_finite, min(step_of(log_radius), longest_turn()), L(0.0));
+  }
+
+  /// The largest terms of some orders from `first` on. Returns of which members all are finite.
+  Mask find_terms(std::size_t first, std::array<L, looked_at>& terms) const {
+    terms.fill(L(0.0));
+    L none(0.0);
+    for_each_part([&]<class Lanes>(std::size_t part, std::type_identity<Lanes>) {
+      if (is_batch<L> && info_.has_momenta && part >= n_) return;  // momenta are not compared
+      const Lanes scale = from_row<Lanes>(scales_[part]), rate_scale = from_row<Lanes>(rate_scales_[part]);
+      Lanes lost(0.0);
+      for (std::size_t j = 0; j < looked_at; ++j) {
+        const std::size_t order = first + j;
+        const Lanes place = from_row<Lanes>(series_.state[order * row_ + part]) * scale;
+        Lanes largest = abs(place);
+        lost = lost + (place - place);
+        if (info_.has_momenta) {
+          const Lanes weight(static_cast<double>(order + 1));
+          const Lanes rate = from_row<Lanes>(series_.state[(order + 1) * row_ + part]) * (weight * rate_scale);
+          largest = max(largest, abs(rate));
+          lost = lost + (rate - rate);
+        }
+        for_each_number(largest, [&](const L& one) { terms[j] = max(terms[j], one); });
+      }
+      for_each_number(lost, [&](const L& one) { none = none + one; });
+    });
+    return none == L(0.0);
+  }
+
+  /// Calls visit(number) for those of one motion that a register holds, or for that of several members.
+  template <class Lanes, class Visit>
+  [[gnu::always_inline]] static void for_each_number(const Lanes& lanes, Visit visit) {
+    if constexpr (std::is_same_v<Lanes, L>) {
+      visit(lanes);
+    } else {
+      alignas(pack_alignment) std::array<double, Lanes::size> numbers;
+      lanes.store(numbers.data());
+      for (const double number : numbers) visit(number);
+    }
   }
 
   /// The time in which no angle turns by more than `most_turn`, as fast as it does now  [s].
@@ -598,32 +686,6 @@ class SeriesSteps {
     }
   }
 
-  /// NaN if it is not finite.
-  L size_of_term(std::size_t order) {
-    L largest(0.0), none(0.0);
-    const auto take = [&](const L& term) {
-      none = none + (term - term);
-      largest = max(largest, abs(term));
-    };
-    if constexpr (is_batch<L>) {
-      for (std::size_t i = 0; i < n_; ++i) {
-        take(coefficient(order, i) * from_row<L>(scales_[i]));
-        take(rate(order, i) * from_row<L>(rate_scales_[i]));
-      }
-    } else {
-      const auto take_row = [&](std::size_t row, double weight, std::size_t count, const PackRows<W>& scales) {
-        for_each_part([&]<class Lanes>(std::size_t first, std::type_identity<Lanes>) {
-          const Lanes terms = from_row<Lanes>(state_[row * row_ + first]);
-          to_row(terms * (Lanes(weight) * from_row<Lanes>(scales[first])), moved_[first]);
-        });
-        for (std::size_t k = 0; k < count; ++k) take(*moved_[k]);
-      };
-      take_row(order, 1, info_.has_momenta ? n_ : 2 * n_, scales_);
-      if (info_.has_momenta) take_row(order + 1, static_cast<double>(order + 1), n_, rate_scales_);
-    }
-    return largest + none;
-  }
-
   /// A coefficient of a rate, times the unit of time.
   L rate(std::size_t order, std::size_t i) const {
     if (!info_.has_momenta) return unit_ * coefficient(order, n_ + i);
@@ -637,11 +699,10 @@ class SeriesSteps {
   FieldLook look_;
   double largest_defect_;  // of accelerations, times h, relative to scales
   double log_reach_;       // step size relative to the estimated radius of convergence, log₂
-  PackRows<W> state_;
+  Series series_, ahead_;  // about the state where the current or the last step begins; about the end of the tried one
   PackRows<W> moved_, turned_, bent_;  // sums of all coordinates
-  PackRows<W> kept_, operands_, inputs_;
-  FullState now_, trial_, begin_;  // begin_: of one motion
-  PackRows<W> seen_;               // a motion on the way of a step
+  FullState now_, trial_, begin_;      // begin_: of one motion
+  PackRows<W> seen_;                   // a motion on the way of a step
   PackRows<W> rates_;
   PackRows<W> arguments_;  // of functions that may be narrow, at three places of a step
   // What terms of coordinates are multiplied by, and of rates, times the unit of time; those of rates as they are.
@@ -650,7 +711,7 @@ class SeriesSteps {
   L time_{0.0}, begin_time_{0.0};
   L tried_{0.0}, step_{1.0};  // of the tried step, of the last one
   L unit_{1.0}, longest_{0.0}, energy_sum_{0.0};
-  bool is_expanded_ = false, is_seated_ = false;
+  bool is_expanded_ = false, is_begun_ = false, is_seated_ = false;  // is_begun_: ahead_ is about the current state
   std::conditional_t<is_batch<L>, std::false_type, std::optional<SeriesTangent>> tangent_;
 };
 
