@@ -76,14 +76,13 @@ class SeriesSteps {
         bent_(row_),
         now_{PackRows<W>(row_), PackRows<W>(row_), Parts(systems.coordinates())},
         trial_(now_),
-        begin_(now_),
         seen_(2 * n_),
         rates_(n_ + 2),
         arguments_(3 * systems.info().argument_is_base.size() + 1),
         scales_(row_),
         rate_scales_(row_),
         unit_row_(1) {
-    for (int i = 0; i < count(); ++i) now_.parts[i] = trial_.parts[i] = begin_.parts[i] = Part::zero();
+    for (int i = 0; i < count(); ++i) now_.parts[i] = trial_.parts[i] = Part::zero();
   }
 
   SeriesSteps& chain() { return *this; }
@@ -202,19 +201,19 @@ class SeriesSteps {
     }
     Mask found = wanted & (none == L(0.0));
     found = found & ends_as(h, tau);
-    const bool may_be_narrow = look_.has_to_look() && any(found);
-    if (may_be_narrow) {
-      see(tau, true);
-      find_arguments(time + h, 2);
-    }
+    if (!look_.has_to_look() || !any(found)) return found;
+    see(tau, true);
+    find_arguments(time + h, 2);
     const Mask is_far = found & goes_far();
     for (int k = 1; k < looks && any(found & is_far); ++k) {
       found = found & (solves(time, h, L(static_cast<double>(k) / looks)) | !is_far);
     }
-    if (!may_be_narrow) return found;
     see(L(0.5) * tau);
     find_arguments(fma(L(0.5), h, time), 1);
-    see(L(0.0));
+    for (std::size_t i = 0; i < n_; ++i) {
+      to_row(coefficient(0, i), seen_[i]);
+      to_row(now_.parts[static_cast<int>(i)].rate[0], seen_[n_ + i]);
+    }
     find_arguments(time, 0);
     const Mask is_doubtful = found & arguments_change();
     return any(is_doubtful) ? found & solves_closely(time, h, is_doubtful) : found;
@@ -248,10 +247,9 @@ class SeriesSteps {
       }
       now_.unit = select(which, trial_.unit, now_.unit);
     } else {
-      std::swap(begin_, now_);
       std::swap(now_, trial_);
       if (tangent_) {
-        tangent_->keep(tried_, motion_of(begin_.parts, time_), motion_of(now_.parts, time_ + tried_));
+        tangent_->keep(tried_, motion_of(trial_.parts, time_), motion_of(now_.parts, time_ + tried_));
       }
     }
     begin_time_ = select(which, time_, begin_time_);
@@ -701,8 +699,8 @@ class SeriesSteps {
   double log_reach_;       // step size relative to the estimated radius of convergence, log₂
   Series series_, ahead_;  // about the state where the current or the last step begins; about the end of the tried one
   PackRows<W> moved_, turned_, bent_;  // sums of all coordinates
-  FullState now_, trial_, begin_;      // begin_: of one motion
-  PackRows<W> seen_;                   // a motion on the way of a step
+  FullState now_, trial_;
+  PackRows<W> seen_;  // a motion on the way of a step
   PackRows<W> rates_;
   PackRows<W> arguments_;  // of functions that may be narrow, at three places of a step
   // What terms of coordinates are multiplied by, and of rates, times the unit of time; those of rates as they are.
