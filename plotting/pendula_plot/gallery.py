@@ -44,7 +44,9 @@ class Case:
 
 
 CASES = (
-    Case("triple_pendulum", "Triple pendulum", "Three links let go from above: chaos that never settles.", 10),
+    Case(
+        "triple_pendulum", "Triple pendulum", "Three links let go from above: chaos that never settles.", 10
+    ),
     Case(
         "triple_pendulum",
         "Fifty copies",
