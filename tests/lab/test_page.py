@@ -629,6 +629,21 @@ def test_energies_do_not_change_by_rounding(open_lab):
     assert page.evaluate("totals.size") == 1
 
 
+@pytest.mark.parametrize(
+    ("link", "key", "taken"),
+    [
+        ("g=500", "g", 100),
+        ("n=2&m=1,2,3", "m", [1, 2]),
+        ("n=3&m=1,2", "m", [1, 2, 2]),
+        ("n=2&m=2,-1", "m", [1, 1]),
+        ("level=none", "level", "student"),
+    ],
+)
+def test_what_is_wrong_in_a_link(open_lab, link, key, taken):
+    """Docs, reference/laboratory."""
+    assert open_lab(link).evaluate(f"pendulaLab.state.{key}") == taken
+
+
 @pytest.mark.parametrize(("space", "name"), [(2, "τ₁"), (3, "τ₁ (y)")])
 def test_torques_have_names_alike(open_lab, space, name):
     page = open_lab(f"space={space}")
