@@ -8,10 +8,10 @@ import subprocess
 import sys
 import tempfile
 import tomllib
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from itertools import islice, zip_longest
+from itertools import islice
 from pathlib import Path
 
 from PIL import Image
@@ -44,16 +44,18 @@ class Case:
 
 
 CASES = (
-    Case("triple_pendulum", "Triple pendulum", "Three links let go from above: chaos that never settles."),
+    Case(
+        "triple_pendulum", "Triple pendulum", "Three links let go from above: chaos that never settles.", 10
+    ),
     Case(
         "triple_pendulum",
         "Fifty copies",
         "Each starts 10⁻⁹ rad from the next: they are one until chaos parts them.",
-        12,
+        10,
         49,
     ),
-    Case("whip", "Whip in space", "Thirty links that get lighter: the end outruns everything before it."),
-    Case("rope", "Rope of 200 links", "Let go almost level, it curls, cracks and swings back."),
+    Case("whip", "Whip in space", "Thirty links that get lighter: the end outruns everything before it.", 10),
+    Case("rope", "Rope of 200 links", "Let go almost level, it curls, cracks and swings back.", 10),
     Case("conical", "Conical motion", "Three links turn around the vertical as one, nearly."),
     Case("spherical_pendulum", "Precession", "A spherical pendulum: its ellipse turns."),
     Case("driven_chain", "Kapitza's pendulum", "Shaken fast enough, it stands on its head."),
@@ -73,12 +75,10 @@ CASES = (
 )
 
 
-def settings(scenario: Path, seconds: float) -> list[str]:
-    """Rows at the frames and between them, no longer than the film."""
-    run = tomllib.loads(scenario.read_text(encoding="utf-8"))["run"]
-    duration = min(seconds, run.get("duration", 10.0))
+def settings(seconds: float) -> list[str]:
+    """Rows at the frames and between them, as long as the film."""
     interval = 1 / (FPS * ROWS_A_FRAME)
-    return ["--set", f"output.interval={interval}", "--set", f"run.duration={duration}"]
+    return ["--set", f"output.interval={interval}", "--set", f"run.duration={seconds}"]
 
 
 def starts(scenario: Path, copies: int) -> list[list[str]]:
@@ -101,7 +101,7 @@ def runs_of(program: str, scenario: Path, case: Case) -> list[Run]:
         rows = Path(folder) / "rows.h5"
         runs = []
         for start in starts(scenario, case.copies):
-            simulate(program, scenario, [*settings(scenario, case.seconds), *start, "-o", str(rows)])
+            simulate(program, scenario, [*settings(case.seconds), *start, "-o", str(rows)])
             runs.append(read_run(rows))
     return runs
 
@@ -119,17 +119,9 @@ def make(program: str, scenario: Path, case: Case, folder: Path) -> list[Run]:
 
 
 def write_strip(films: list[Film], path: Path) -> None:
-    """Films side by side, as long as the longest; the others wait at their ends."""
+    """Films side by side, as long as the shortest: none stands still."""
     samples = [join(images) for images in zip(*(film.samples() for film in films), strict=False)]
-    animation.write(map(join, side_by_side(films)), path, FPS, samples)
-
-
-def side_by_side(films: list[Film]) -> Iterator[list[Image.Image]]:
-    """The frames of all films at once."""
-    shown = [None] * len(films)
-    for images in zip_longest(*(film.frames() for film in films)):
-        shown = [new or old for new, old in zip(images, shown, strict=True)]
-        yield shown
+    animation.write(map(join, zip(*(film.frames() for film in films), strict=False)), path, FPS, samples)
 
 
 def join(images: Sequence[Image.Image]) -> Image.Image:

@@ -514,6 +514,9 @@ def test_nothing_hangs_over(open_lab, scheme):
         )
         assert page.evaluate("document.documentElement.scrollWidth <= innerWidth"), width
         assert page.evaluate("Math.min(pendulaLab.stage.width, pendulaLab.stage.height)") > 220, width
+        hint, stage = (page.locator(each).bounding_box() for each in ("#hint", "#stage"))
+        above = stage["y"] + stage["height"] - hint["y"] - hint["height"]
+        assert above > 31, width  # measured 36; the words of the grid's length end there
 
 
 @pytest.mark.parametrize("level", ["first", "all"])
@@ -528,6 +531,7 @@ def test_levels_and_languages(open_lab):
     page = open_lab("level=first", locale="ja-JP")
     assert page.get_attribute("html", "lang") == "ja"
     assert page.inner_text("#title") == "振り子の実験室"
+    assert page.title() == "振り子の実験室 – pendula"
     assert page.get_by_text("ポアンカレ断面").is_hidden()
     page.select_option("#level", "all")
     assert page.get_by_text("ポアンカレ断面").is_visible()
@@ -610,6 +614,40 @@ def test_what_shakes_is_a_band(open_lab):
 def test_what_acts_has_a_panel(open_lab, link, is_shown):
     page = open_lab(link)
     assert page.get_by_text("What acts").is_visible() == is_shown
+
+
+def test_energies_do_not_change_by_rounding(open_lab):
+    """The energy of the second one lies in the middle between two numbers that are shown."""
+    zero = open_lab("n=1&th=90deg", size=WIDE)
+    assert "Total 0.00 J" in zero.inner_text("#panels")
+    page = open_lab("n=1&th=120deg&g=9.83&speed=4", size=WIDE, motion="no-preference")
+    page.evaluate(
+        """window.totals = new Set();
+           setInterval(() => totals.add(document.getElementById("panels").innerText.match(/Total (\\S+) J/)[1]), 5)"""
+    )
+    until(page, "pendulaLab.shown > 8 && totals.size > 0")
+    assert page.evaluate("totals.size") == 1
+
+
+@pytest.mark.parametrize(
+    ("link", "key", "taken"),
+    [
+        ("g=500", "g", 100),
+        ("n=2&m=1,2,3", "m", [1, 2]),
+        ("n=3&m=1,2", "m", [1, 2, 2]),
+        ("n=2&m=2,-1", "m", [1, 1]),
+        ("level=none", "level", "student"),
+    ],
+)
+def test_what_is_wrong_in_a_link(open_lab, link, key, taken):
+    """Docs, reference/laboratory."""
+    assert open_lab(link).evaluate(f"pendulaLab.state.{key}") == taken
+
+
+@pytest.mark.parametrize(("space", "name"), [(2, "τ₁"), (3, "τ₁ (y)")])
+def test_torques_have_names_alike(open_lab, space, name):
+    page = open_lab(f"space={space}")
+    assert page.get_by_text(f"{name}: amplitude", exact=True).is_visible()
 
 
 def test_the_axes_of_what_rests_are_not_those_of_rounding(open_lab):

@@ -14,6 +14,7 @@ class Looks {
     if (window.parent !== window) document.documentElement.dataset.embedded = "yes";
     at("title").dataset.text = models[named] ? `model.${named}` : beginning.title && moved === beginning ? "" : "title";
     writeTexts(state.lang || navigator.languages.map((each) => each.split("-")[0]).find((each) => texts[each]) || "en");
+    document.title = `${at("title").textContent} – pendula`;
     at("language").replaceChildren(...Object.keys(texts).map((each) => element("option", { value: each, textContent: texts[each]["language.name"], selected: each === language })));
     at("level").value = state.level;
     at("speed").replaceChildren(...speedChoices.map((speed) => element("option", { value: speed, textContent: speed < 1 ? `1/${1 / speed}` : `${speed}×` })));

@@ -379,7 +379,7 @@ class Lab {
   #writeTime() {
     const { history, shown } = this;
     const words = `${steady(shown)} s`;
-    if (words !== this.written) at("clock").textContent = at("time").textContent = this.written = words;
+    if (words !== this.written) at("clock").textContent = this.written = words;
     const scrub = at("scrub");
     if (this.frames % 4 === 0 || !this.playing) {
       scrub.min = history.start, scrub.max = Math.max(history.end, history.start + 1e-3), scrub.value = shown;

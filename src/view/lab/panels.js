@@ -116,7 +116,8 @@ class EnergyPanel extends Panel {
     const colours = [1, 0, 5].map((k) => rgba(palette.curves[k]));
     values.forEach((value, k) => this.curve(pen, colours[k], value, k === 2 ? 2.2 : 1.6));
     pen.restore();
-    const now = [lab.row[kinetic], lab.row[potential], lab.row[kinetic] + lab.row[potential]].map((x) => `${steady(x)} J`);
+    const digits = clamp(2 - Math.floor(Math.log10(lab.energyScale)), 0, 6); // three of the pendulum's energy
+    const now = [lab.row[kinetic], lab.row[potential], lab.row[kinetic] + lab.row[potential]].map((x) => `${steady(x, digits)} J`);
     const names = ["kinetic", "potential", "total"].map((key, k) => `${text(key)} ${now[k]}`);
     this.name(...names.map((name, k) => [colours[k], name]));
     this.describe(`${text("panel.energy")}: ${names.join(", ")}`);

@@ -24,9 +24,11 @@ function readable(x, digits = 4) {
   return text.replaceAll("-", "−");
 }
 
-/// A number that changes while it is read: always as many digits after the point.
+/// A number that changes while it is read: always as many digits after the point. What rounding alone moves does not change
+/// them, and zero has no sign.
 function steady(x, digits = 2) {
-  return x.toFixed(digits).replace("-", "−");
+  const text = Number(x.toFixed(digits + 6)).toFixed(digits);
+  return Number(text) === 0 ? text.replace("-", "") : text.replace("-", "−");
 }
 
 function trimmedExponential(x, digits) {
@@ -51,12 +53,13 @@ function lowered(digits) {
   return [...digits].map((c) => "₀₁₂₃₄₅₆₇₈₉"[c]).join("");
 }
 
-/// theta_12_dot as θ₁₂: what a plot calls a coordinate.
+/// theta_12 as θ₁₂, torque_y_1 as τ₁ (y): what a plot calls a coordinate or an input.
 function symbol(name) {
   const greek = { theta: "θ", phi: "φ", psi: "ψ", alpha: "α", beta: "β", gamma: "γ", torque: "τ" };
   const [stem, ...rest] = name.split("_");
   const index = rest.join("_");
-  const below = /^\d+$/.test(index) ? lowered(index) : index && `_${index}`;
+  const [, axis, link] = /^(?:([xyz])_)?(\d+)$/.exec(index) ?? [];
+  const below = link ? lowered(link) + (axis ? ` (${axis})` : "") : index && `_${index}`;
   return (greek[stem] ?? stem) + below;
 }
 
