@@ -1,6 +1,7 @@
 #include "prepared.hpp"
 
 #include <nanobind/stl/map.h>
+#include <nanobind/stl/optional.h>
 #include <nanobind/stl/shared_ptr.h>
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/vector.h>
@@ -78,6 +79,20 @@ std::map<std::string, std::string> units_of(const Prepared& made) {
   return units;
 }
 
+/// The number in a text with a unit, as the column has it; nothing if it is none.
+std::optional<double> with_unit(const Prepared& made, const std::string& text, const std::string& column) {
+  const std::optional<io::NaturalUnits> natural =
+      std::visit([](const auto& scenario) { return scenario.natural; }, made.scenario);
+  const io::BaseUnits base = natural ? io::BaseUnits{natural->mass, natural->length, natural->time} : io::BaseUnits{};
+  const std::vector<std::string> columns = made.subject->columns();
+  for (const Quantity& quantity : made.subject->quantities()) {
+    for (std::size_t k = 0; k < quantity.size(); ++k) {
+      if (columns[quantity.column(k)] == column) return io::with_unit(text, quantity.unit, base);
+    }
+  }
+  return std::nullopt;
+}
+
 void require_continuous(const io::RunPlan& plan) {
   for (const io::FeedbackPlan& feedback : plan.feedback) {
     if (feedback.sample == 0) continue;
@@ -137,6 +152,7 @@ void define_prepared(nb::module_& module) {
       .def_prop_ro(
           "start", [](const Prepared& made) { return vector_of(state_of(made.start)); }, nb::rv_policy::move)
       .def_prop_ro("units", &units_of)
+      .def("with_unit", &with_unit, nb::arg("text"), nb::arg("column"))
       .def_prop_ro("constants", &constants_of)
       .def_prop_ro("is_natural",
                    [](const Prepared& made) {
