@@ -643,7 +643,7 @@ def _near(error: Exception, names: dict[str, object]) -> str:
             return f"; SymPy has it: from sympy import {name}"
         known = [*names, *dir(builtins)]
     elif isinstance(error, TypeError) and re.search("convert expression to float|loop of ufunc", str(error)):
-        return "; take functions of SymPy: from sympy import cos, sin"
+        return "; take SymPy's: from sympy import cos, sin"
     elif isinstance(error, AttributeError):
         known = [one for one in dir(error.obj) if not one.startswith("_")]
     else:

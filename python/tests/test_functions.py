@@ -183,9 +183,9 @@ def test_errors_name_the_line_of_the_function_and_near_names(tmp_path, monkeypat
         ("sin(theta)", r"mine\.py:11: .* got sin; SymPy has it: from sympy import sin$"),
         (
             "__import__('math').cos(theta)",
-            r"mine\.py:11: TypeError: .*; take functions of SymPy: from sympy import",
+            r"mine\.py:11: TypeError: .*; take SymPy's: from sympy import cos",
         ),
-        ("__import__('numpy').cos(theta)", r"mine\.py:11: .*; take functions of SymPy: from sympy import"),
+        ("__import__('numpy').cos(theta)", r"mine\.py:11: .*; take SymPy's: from sympy import cos"),
         ("model.parametr('a', '1')", r"mine\.py:11: AttributeError: .*; did you mean parameter "),
         ("1 / 0", r"mine\.py:11: ZeroDivisionError"),
         ("theta * 'a'", r"mine\.py:11: "),
