@@ -469,6 +469,11 @@ TEST(Scenario, NumbersMayHaveUnits) {
       spatial_text, {"chain.drive[1].frequency=\"2 Hz\"", "chain.drive[1].amplitude=[\"1 kN m\", 0, \"2 J\"]"});
   EXPECT_DOUBLE_EQ(driven.chain.drives()[0].frequency, 4 * std::numbers::pi);
   EXPECT_EQ(driven.chain.drives()[0].amplitude, Eigen::Vector3d(1e3, 0, 2));
+  for (const std::string micro : {"u", "\u00b5", "\u03bc"}) {
+    const auto small = parsed<Planar>(planar_text, {"chain.lengths=5 " + micro + "m", "run.duration=5 " + micro + "s"});
+    EXPECT_EQ(small.chain.lengths(), numbers({5 * 1e-6, 5 * 1e-6}));
+    EXPECT_EQ(small.duration, 5 * 1e-6);
+  }
 }
 
 TEST(Scenario, UnitsOfNaturalScenariosAreConverted) {

@@ -642,6 +642,8 @@ def _near(error: Exception, names: dict[str, object]) -> str:
         if name is not None and hasattr(sympy, name):
             return f"; SymPy has it: from sympy import {name}"
         known = [*names, *dir(builtins)]
+    elif isinstance(error, TypeError) and re.search("convert expression to float|loop of ufunc", str(error)):
+        return "; take SymPy's: from sympy import cos, sin"
     elif isinstance(error, AttributeError):
         known = [one for one in dir(error.obj) if not one.startswith("_")]
     else:

@@ -89,9 +89,9 @@ def chosen(runs: list[Run], choice: Choice) -> list[str]:
     return there if len(there) <= MOST_CURVES else [*there[: MOST_CURVES - 1], there[-1]]
 
 
-def legend(axes: Axes) -> None:
+def legend(axes: Axes, title: str | None = None) -> None:
     if len(axes.get_legend_handles_labels()[0]) > 1:
-        axes.legend(loc="best", fontsize="small")
+        axes.legend(loc="best", fontsize="small", title=title)
 
 
 def curves(runs: list[Run], names: list[str]) -> list[tuple[Run, str, str, str]]:
@@ -137,7 +137,9 @@ def draw_series(axes: Axes, runs: list[Run], choice: Choice, names: list[str]) -
         axes.plot(run.time, shown(run, name, choice), color=colour, label=text)
     axes.set_xlabel(label(runs[0], "t"))
     axes.set_ylabel(axis_label(runs[0], names))
-    legend(axes)
+    there = len(runs[0].coordinates)
+    some = len(runs) == 1 and there > MOST_CURVES and not choice.coordinates
+    legend(axes, f"{MOST_CURVES} of {there}" if some else None)
 
 
 def phase_of(runs: list[Run], choice: Choice) -> tuple[str, str]:

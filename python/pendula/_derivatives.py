@@ -11,7 +11,7 @@ from . import _core
 from ._core import InputError
 from ._gradient import Varied
 from ._linear import LinearSystem
-from ._runs import duration_of, plainly, positive, state_names, warn
+from ._runs import duration_of, plainly, positive, quantity, state_names, warn
 from ._simulation import Beginning, Simulation, split
 from ._systems import System, ascending_times, span_of, starts_of, system_of
 
@@ -41,7 +41,7 @@ class Derivatives(NamedTuple):
 
 def differentiate(
     system: System,
-    duration: float | None = None,
+    duration: float | str | None = None,
     *,
     t: ArrayLike | None = None,
     start: Mapping[str, object] | None = None,
@@ -97,11 +97,11 @@ def differentiate(
     >>> round(float(numpy.linalg.det(moved.by_start[0])), 9) > 0
     True
     """
-    times = _times(duration, t)
     given, runs = split(differentiate, system, start, options)
     if direction not in ("both", "up", "down"):
         raise InputError(f'direction: expected "both", "up" or "down", got {direction!r}')
     made = Beginning.of(system, given, tolerance=tolerance, step=step, options=runs).prepare()
+    times = _times(duration, t, made)
     varied = Varied(made)
     warn(made.warnings, stacklevel=3)
     if until is not None:
@@ -150,7 +150,7 @@ def linearize(
     system: System,
     start: Mapping[str, object] | None = None,
     *,
-    step: float | None = None,
+    step: float | str | None = None,
     tolerance: float | None = None,
     outputs: Outputs | None = None,
     **starts: object,
@@ -199,18 +199,17 @@ def linearize(
         if tolerance is not None:
             raise InputError("tolerance: expected none without step, got one")
         return simulation.linearize(outputs)
-    moved = differentiate(
-        system, positive("step", step), start={**system.at_zero(), **given}, tolerance=tolerance
-    )
+    length = positive("step", quantity("step", step, simulation._made))
+    moved = differentiate(system, length, start={**system.at_zero(), **given}, tolerance=tolerance)
     by_inputs = [moved.by_inputs[name][0] for name in moved.by_inputs]
     b = np.hstack([np.empty((moved.y.shape[0], 0)), *by_inputs])
-    return LinearSystem(moved.by_start[0], b, step=float(step), **simulation._seen(outputs))
+    return LinearSystem(moved.by_start[0], b, step=length, **simulation._seen(outputs))
 
 
-def _times(duration: float | None, t: ArrayLike | None) -> NDArray[np.float64]:
+def _times(duration: object, t: ArrayLike | None, made: _core.Prepared) -> NDArray[np.float64]:
     times, end = span_of("differentiate", duration, t)
     if times is None:
-        return np.array([duration_of(end)])
+        return np.array([duration_of(end, made)])
     if duration is not None:
         raise InputError("duration: expected none beside t, got both")
     return ascending_times(times)

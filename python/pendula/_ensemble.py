@@ -13,7 +13,7 @@ from ._ensemble_rows import rows_of_members, threads_of
 from ._ensemble_text import Design, ensemble_text
 from ._events import event_tables
 from ._progress import progress_line
-from ._runs import RunFailed, duration_of, mapping, places, plainly, tell, warn
+from ._runs import RunFailed, mapping, places, plainly, tell, warn
 from ._simulation import split
 from ._systems import System, span_of, system_of
 
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 def ensemble(
     system: System,
-    duration: float | None = None,
+    duration: float | str | None = None,
     start: Mapping[str, object] | None = None,
     *,
     t: ArrayLike | None = None,
@@ -129,8 +129,8 @@ def ensemble(
     >>> data["theta_2"].dims, data["theta_2"].shape
     (('member', 't'), (4, 11))
     """
-    times, how_long = span_of("ensemble", duration, t)
     starts, runs = split(ensemble, system, start, options)
+    times, how_long = span_of("ensemble", duration, t)
     kept = [keep] if isinstance(keep, str) else keep
     method = runs.pop("method", None)
     keys, drawn = mapping("axes", axes), mapping("random", random)
@@ -141,7 +141,7 @@ def ensemble(
     if step is None and tolerance is None and accuracy is None:
         tolerance = 1e-9
     run = {
-        "duration": duration_of(how_long),
+        "duration": how_long,
         "method": None if method == "auto" else method,
         "tolerance": tolerance,
         "step": step,

@@ -2,20 +2,22 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from os import PathLike
 from pathlib import Path
 
 from ._core import InputError
-from ._runs import mapping, number, numbers, require_known
+from ._runs import mapping, numbers, require_known
 
 Signals = dict[str, dict[str, object]]
+MOTIONS = '; a motion of the model is no input: drives=[{"input": "NAME", "value": "sin(t)"}] moves one'
 _KEYS = ("file", "column", "times", "values", "hold")
 
 
-def inputs_of(given: Mapping[str, object]) -> tuple[dict[str, float], Signals]:
-    """Those that are held, and signals: the keys of a table ``[[system.signal]]`` each. Raises InputError."""
-    held: dict[str, float] = {}
+def inputs_of(given: Mapping[str, object]) -> tuple[dict[str, object], Signals]:
+    """Those that are held, as they are, and signals: keys of a table ``[[system.signal]]`` each. Raises InputError."""
+    held: dict[str, object] = {}
     signals: Signals = {}
     for name, one in given.items():
         where = f"inputs.{name}"
@@ -26,6 +28,8 @@ def inputs_of(given: Mapping[str, object]) -> tuple[dict[str, float], Signals]:
             )
         if isinstance(one, Mapping):
             signals[name] = _signal(name, where, mapping(where, one))
+        elif isinstance(one, str) and re.match(r"\s*[-+]?\.?\d", one) and not one.endswith(".csv"):
+            held[name] = one  # with a unit
         elif isinstance(one, (str, PathLike)):
             signals[name] = _signal(name, where, {"file": one})
         elif isinstance(one, (tuple, list)):
@@ -33,7 +37,7 @@ def inputs_of(given: Mapping[str, object]) -> tuple[dict[str, float], Signals]:
                 raise InputError(f"{where}: expected (times, values), got {len(one)} of them")
             signals[name] = _signal(name, where, {"times": one[0], "values": one[1]})
         else:
-            held[name] = number(where, one)
+            held[name] = one
     return held, signals
 
 

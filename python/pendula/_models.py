@@ -15,8 +15,8 @@ import numpy as np
 
 from . import _core
 from ._core import InputError
-from ._inputs import inputs_of
-from ._runs import mapping, places, plainly, require_known, tell
+from ._inputs import MOTIONS, Signals, inputs_of
+from ._runs import mapping, places, plainly, quantity, require_known, tell, unknown
 from ._systems import System, Tables, tables_of
 
 if TYPE_CHECKING:
@@ -90,12 +90,30 @@ class Model(System):
         name = str(model)
         self._name = str(Path(name).resolve()) if name.endswith(".py") else name
         self._links = links
-        self._parameters = copy.deepcopy(parameters)
+        known = [name for name, *_ in self._info.parameters]
+        for name in parameters:
+            if name not in known:
+                raise unknown("Model", name, [*known, "links", *(Model.__init__.__kwdefaults__ or ())])
+        self._parameters = {name: self._plain(name, one) for name, one in copy.deepcopy(parameters).items()}
         self._drives = tables_of("drives", drives)
         self._feedback = tables_of("feedback", feedback)
-        self._inputs, self._signals = inputs_of(mapping("inputs", inputs))
+        self._inputs, self._signals = self._inputs_of(mapping("inputs", inputs))
         self._made_by = ""
         self._require_arguments()
+
+    def _plain(self, name: str, given: object) -> object:
+        """A parameter without its unit; what is wrong stays as it is, for the reader of scenarios."""
+        if isinstance(given, (list, tuple)):
+            return [self._plain(name, one) for one in given]
+        found = self._info.with_unit(given, name) if isinstance(given, str) else None
+        return given if found is None else found
+
+    def _inputs_of(self, given: Mapping[str, object]) -> tuple[dict[str, float], Signals]:
+        require_known("inputs", given, self.inputs, MOTIONS if self.model_file() else "")
+        held, signals = inputs_of(given)
+        return {
+            name: quantity(f"inputs.{name}", one, self._info, name) for name, one in held.items()
+        }, signals
 
     def _require_arguments(self) -> None:
         """Raises InputError; parameters without a default need not be there before the model moves."""
@@ -103,9 +121,8 @@ class Model(System):
         later = {name: 1.0 for name, _, default in self._info.parameters if math.isnan(default)}
         tables["system"] = {**tables["system"], "parameters": {**later, **self._parameters} or None}  # type: ignore[dict-item]
         first = len(self._drives) + 1
-        self._require_right(
-            tables, {f"drive[{first + k}]": f"inputs.{name}" for k, name in enumerate(self._inputs)}
-        )
+        numbers = {f"drive[{first + k}]": f"inputs.{name}" for k, name in enumerate(self._inputs)}
+        self._require_right(tables, {**numbers, **self._tables_over_time()})
 
     def __repr__(self) -> str:
         given = {
@@ -143,7 +160,7 @@ class Model(System):
 
     @property
     def inputs(self) -> list[str]:
-        """Names of the inputs."""
+        """Names of the inputs. Motions, which ``pendula describe`` lists, are none: drives alone move them."""
         return [name for name, _ in self._info.inputs]
 
     @property
@@ -153,15 +170,9 @@ class Model(System):
 
     @property
     def parameters(self) -> dict[str, object]:
-        """As they were given, or the model's defaults; NaN where it has none."""
+        """As they were given, without units, or the model's defaults; NaN where it has none."""
         defaults = {name: default for name, _, default in self._info.parameters}
         return {**defaults, **copy.deepcopy(self._parameters)}
-
-    @property
-    def units(self) -> dict[str, str]:
-        """Of coordinates, rates, inputs and parameters, by name."""
-        info = self._info
-        return dict([*info.coordinates, *info.rates, *info.inputs, *(named[:2] for named in info.parameters)])
 
     @property
     def kernel(self) -> Kernel:
@@ -178,7 +189,8 @@ class Model(System):
 
     def start_names(self) -> list[str]:
         names = dict.fromkeys([*self.coordinates, *(re.sub(r"_\d+$", "", one) for one in self.coordinates)])
-        return [*names, *self.rates, *(form.format(name) for form in ("{}_dot", "p_{}") for name in names)]
+        rates = dict.fromkeys([*self.rates, *(re.sub(r"_\d+$", "", one) for one in self.rates)])
+        return [*names, *rates, *(f"p_{name}" for name in names)]
 
     def model_file(self) -> Path | None:
         return Path(self._name) if self._name.endswith(".py") else None
@@ -213,8 +225,7 @@ class Model(System):
         return self.replaced({}, {name: np.zeros(1) for name in self.inputs})
 
     def held(self, inputs: Mapping[str, object]) -> Model:
-        require_known("inputs", inputs, self.inputs)
-        numbers, signals = inputs_of(inputs)
+        numbers, signals = self._inputs_of(inputs)
         other = self.replaced({}, {name: np.array([numbers.get(name, 0.0)]) for name in inputs})
         other._signals = {
             **{name: one for name, one in self._signals.items() if name not in inputs},

@@ -57,6 +57,12 @@ class Raised(Exception):  # noqa: N818  (nobody sees it)
     """What a function of the user has raised, on its way through C++: its first argument."""
 
 
+_WORDS = {  # of the program, and ours
+    "--resume": "resume=True",
+    "signal: expected a system without signals, got one with": "inputs: expected numbers, got tables over time",
+}
+
+
 @contextmanager
 def plainly(names: Mapping[str, str] | None = None) -> Iterator[None]:
     """Errors about arguments name those, not lines and keys of a text that nobody wrote.
@@ -70,7 +76,9 @@ def plainly(names: Mapping[str, str] | None = None) -> Iterator[None]:
     except _core.StepFailed as error:
         raise RunFailed(str(error)) from None
     except ValueError as error:
-        sentence = _where_written(str(error)).replace("--resume", "resume=True")
+        sentence = _where_written(str(error))
+        for theirs, ours in _WORDS.items():
+            sentence = sentence.replace(theirs, ours)
         made = sentence.startswith(("pendula:", "run."))
         raise _core.InputError(in_arguments(sentence, names) if made else sentence) from None
 
@@ -140,7 +148,7 @@ def unknown(where: str, given: str, known: Iterable[str]) -> _core.InputError:
     told = f"{where}: unknown keyword {given}"
     if given in SCIPY:
         return _core.InputError(f"{told}: here it is {SCIPY[given]}")
-    names = list(known)
+    names = list(dict.fromkeys(known))
     return _core.InputError(told + (did_you_mean(given, names) or f", expected some of {', '.join(names)}"))
 
 
@@ -150,14 +158,15 @@ def did_you_mean(given: str, names: Iterable[str]) -> str:
     return f"; did you mean {' or '.join(near)}?" if near else ""
 
 
-def require_known(where: str, given: Iterable[str], known: Iterable[str]) -> None:
-    """Raises InputError on a name that is none of those."""
+def require_known(where: str, given: Iterable[str], known: Iterable[str], hint: str = "") -> None:
+    """Raises InputError on a name that is none of those; where none is near, with the hint."""
     names = list(known)
     for name in given:
         if name not in names:
-            listed = ", ".join(names) or "none"
-            near = did_you_mean(name, names)
-            raise _core.InputError(f"{where}: expected some of {listed}, got {name}{near}")
+            listed = f"some of {', '.join(names)}" if names else "none"
+            raise _core.InputError(
+                f"{where}: expected {listed}, got {name}{did_you_mean(name, names) or hint}"
+            )
 
 
 def columns_of(name: str, columns: Sequence[str]) -> list[str]:
@@ -183,6 +192,16 @@ def number(name: str, given: object) -> float:
     raise _core.InputError(f"{name}: expected a finite number, got {given!r}")
 
 
+def quantity(name: str, given: object, info: _core.Prepared | _core.ModelInfo, of: str = "t") -> float:
+    """The same, or a text with a unit of the kind that a column, an input or a parameter has."""
+    found = info.with_unit(given, of) if isinstance(given, str) else given
+    if found is None:
+        raise _core.InputError(
+            f"{name}: expected a finite number or a string in {info.units[of]}, got {given!r}"
+        )
+    return number(name, found)
+
+
 def positive(name: str, given: object) -> float:
     """The same of one > 0."""
     found = number(name, given)
@@ -198,9 +217,9 @@ def whole(name: str, given: object, least: int) -> int:
     raise _core.InputError(f"{name}: expected a whole number >= {least}, got {given!r}")
 
 
-def duration_of(given: object) -> float:
+def duration_of(given: object, made: _core.Prepared) -> float:
     """In s. Raises InputError."""
-    found = number("duration", given)
+    found = quantity("duration", given, made)
     if found < 0:
         raise _core.InputError(f"duration: expected a number, not negative, got {given!r}")
     return found

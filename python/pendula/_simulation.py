@@ -14,15 +14,17 @@ import numpy as np
 from . import _core, _toml
 from ._core import InputError
 from ._events import events_of
+from ._inputs import MOTIONS
 from ._linear import LinearSystem, seen
 from ._runs import (
+    columns_of,
     duration_of,
     in_order,
     mapping,
     merged,
-    number,
     places,
     plainly,
+    quantity,
     require_known,
     state_names,
     tell,
@@ -38,7 +40,8 @@ if TYPE_CHECKING:
     from ._events import Event
     from ._linear import Outputs
 
-    Controller = Callable[[float, NDArray[np.float64]], Mapping[str, float]]
+    Inputs = Mapping[str, float | str]
+    Controller = Callable[[float, NDArray[np.float64]], Inputs]
 
 RUN_OPTIONS = ("method", "stages", "form", "solver", "iteration")
 
@@ -231,11 +234,16 @@ class Simulation:
         with self._alone():
             return self._core.number(column)
 
-    def hold(self, inputs: Mapping[str, float] | None = None, **more: float) -> Simulation:
-        """Holds inputs from now on, until others are held. Raises InputError, and then holds what it did."""
-        given = merged("inputs", inputs, more)
-        require_known("inputs", given, self._inputs)
-        values = {name: number(name, one) for name, one in given.items()}
+    def hold(self, inputs: Inputs | None = None, **more: float | str) -> Simulation:
+        """Holds inputs from now on, until others are held; ``torque`` is that of all links. Raises InputError, and then
+        holds what it did."""
+        given = {
+            column: one
+            for name, one in merged("inputs", inputs, more).items()
+            for column in columns_of(name, self._inputs) or [name]
+        }
+        require_known("inputs", given, self._inputs, MOTIONS if self._text.model_file else "")
+        values = {name: quantity(name, one, self._made, name) for name, one in given.items()}
         with self._alone():
             before = dict(zip(self._inputs, self._core.held, strict=True))
             if values:
@@ -244,22 +252,23 @@ class Simulation:
                     self._holds[self._core.time] = self._core.held
         return self
 
-    def advance_to(self, time: float) -> Simulation:
+    def advance_to(self, time: float | str) -> Simulation:
         """Goes on to ``time``, in s, where a step ends. Raises RunFailed where the mathematics fails."""
-        end = number("time", time)
+        end = quantity("time", time, self._made)
         with self._alone():
             self._core.advance_to(end)
         return self
 
     def step(
         self,
-        duration: float,
-        inputs: Mapping[str, float] | Controller | None = None,
-        sample: float | None = None,
+        duration: float | str,
+        inputs: Inputs | Controller | None = None,
+        sample: float | str | None = None,
         /,
-        **more: float,
+        **more: float | str,
     ) -> Simulation:
-        """Holds inputs, and goes on by ``duration``, in s: a zero-order hold, with steps chosen inside.
+        """Holds inputs, and goes on by ``duration``, in s: a zero-order hold, with steps chosen inside. Numbers may
+        have units: ``step("10 ms", push="100 mN")``.
 
         ``inputs`` may be a function of the time and the state, which gives inputs by name: it is called every
         ``sample`` seconds, or once. For a law that is an expression of the columns, see ``feedback`` of the system.
@@ -269,12 +278,12 @@ class Simulation:
         >>> cart.step(1.0, lambda t, y: {"push": -2 * y[2]}, 0.01).inputs["push"] != 0
         True
         """
-        begin, left = self.time, number("duration", duration)
+        begin, left = self.time, quantity("duration", duration, self._made)
         if not callable(inputs):
             if sample is not None:
                 raise InputError("sample: expected none where inputs are no function, got one")
             return self.hold(inputs, **more).advance_to(begin + left)
-        every = left if sample is None else number("sample", sample)
+        every = left if sample is None else quantity("sample", sample, self._made)
         if not every > 0 and left > 0:
             raise InputError(f"sample: expected a time > 0, got {sample!r}")
         for k in range(max(1, math.ceil(left / every * (1 - 1e-12))) if left > 0 else 0):
@@ -282,9 +291,9 @@ class Simulation:
             self.advance_to(begin + min(left, (k + 1) * every))
         return self
 
-    def at(self, time: float) -> NDArray[np.float64]:
+    def at(self, time: float | str) -> NDArray[np.float64]:
         """The state at any time since the start, at the full order of the method."""
-        when = number("time", time)
+        when = quantity("time", time, self._made)
         with self._alone():
             return self._core.at(when)
 
@@ -297,8 +306,8 @@ class Simulation:
     ) -> Solution:
         """The whole motion up to now as a run: rows, page, plots and events, with the inputs that were held.
 
-        The run is made again for it, by the same steps, with these inputs as signals; and it says how far it can be
-        trusted.
+        The run is made again for it, with these inputs as signals: by steps of the same size or tolerance, which end
+        where inputs changed, not where every call did. It says how far it can be trusted.
 
         Parameters
         ----------
@@ -411,7 +420,7 @@ class Lyapunov(NamedTuple):
 
 def lyapunov(
     system: System,
-    duration: float = 1000.0,
+    duration: float | str = 1000.0,
     *,
     count: int = 0,
     start: Mapping[str, object] | None = None,
@@ -425,10 +434,10 @@ def lyapunov(
     >>> pendula.lyapunov(pendula.Chain(links=1), 20.0, theta=0.5, step=0.02).exponents.shape
     (2,)
     """
-    how_long = duration_of(duration)
     how_many = whole("count", count, 0)
     given, runs = split(lyapunov, system, start, starts)
     made = Beginning.of(system, given, tolerance=tolerance, step=step, options=runs).prepare()
+    how_long = duration_of(duration, made)
     warn(made.warnings, stacklevel=3)
     with plainly():
         return Lyapunov(*_core.lyapunov(made, how_long, how_many))

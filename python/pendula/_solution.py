@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from math import inf
 from os import PathLike, fspath
 from pathlib import Path
@@ -87,11 +87,17 @@ class Solution:
         found = [self._places[column] for column in self._columns(name)]
         return self._rows[:, found[0]] if name in self._places else self._rows[:, found].T
 
+    def __contains__(self, name: object) -> bool:
+        return isinstance(name, str) and bool(columns_of(name, self.columns))
+
+    def __iter__(self) -> Iterator[str]:
+        """Names of the columns."""
+        return iter(self.columns)
+
     def _columns(self, name: str) -> list[str]:
-        found = columns_of(name, self.columns)
-        if not found:
+        if name not in self:
             raise KeyError(f"{name}: expected one of {', '.join(self.columns)}")
-        return found
+        return columns_of(name, self.columns)
 
     def sol(self, t: ArrayLike) -> NDArray[np.float64]:
         """The motion at any times of the run, in any order, at the full order of the method.
@@ -109,8 +115,12 @@ class Solution:
             In the order of ``names``.
         """
         when = numbers("t", t)
+        if when.ndim > 1:
+            raise _core.InputError(
+                f"t: expected a time or a vector of times, got an array of shape {when.shape}"
+            )
         begin, end = self._span()
-        if when.ndim > 1 or self.t.size == 0 or not np.all((when >= begin) & (when <= end)):
+        if self.t.size == 0 or not np.all((when >= begin) & (when <= end)):
             there = f"times from {begin} to {end} s" if self.t.size else "a solution with rows"
             raise _core.InputError(f"t: expected {there}, got {t!r}")
         times, order = np.unique(when, return_inverse=True)
@@ -273,7 +283,8 @@ class Solution:
     def __repr__(self) -> str:
         rows = f"{self.t.size} rows to t = {self.t[-1]:.6g} s" if self.t.size else "no rows"
         s = self.summary
-        how = f", {s['steps']} steps of {s['method']}, energy error {s['energy_error_max']:.2g}" if s else ""
+        by = "change" if self._result.loaded else "error"
+        how = f", {s['steps']} steps of {s['method']}, energy {by} {s['energy_error_max']:.2g}" if s else ""
         return f"<Solution: {rows}{how}: {self.message}>"
 
     def plot(self, *names: str, axes: Axes | None = None, label: str | None = None) -> Axes:

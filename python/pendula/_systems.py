@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import copy
+import re
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Never
 
 import numpy as np
 
@@ -79,7 +80,9 @@ def starts_of(
     if more:
         known = system_of(system).start_names()
         for name in more:
-            if name not in known:
+            if (
+                re.sub(r"(_\d+)_dot$", r"_dot\1", name) not in known
+            ):  # of theta_1_dot, an older name, the present one
                 raise unknown(where, name, [*known, *options])
     return merged("start", start, more)
 
@@ -89,6 +92,8 @@ class System(ABC):
 
     Systems are equal that move alike: those of the same kind, with the same numbers.
     """
+
+    _signals: Signals
 
     @abstractmethod
     def tables(self) -> Tables:
@@ -110,9 +115,17 @@ class System(ABC):
         """Parameters by name."""
 
     @property
-    @abstractmethod
     def units(self) -> dict[str, str]:
         """Of coordinates, rates, inputs and parameters, by name."""
+        known = self._info.units
+        return {
+            name: known[name] for name in (*self.coordinates, *self.rates, *self.inputs, *self.parameters)
+        }
+
+    @cached_property
+    @abstractmethod
+    def _info(self) -> _core.Prepared | _core.ModelInfo:
+        """What the program knows of it."""
 
     @property
     @abstractmethod
@@ -132,6 +145,10 @@ class System(ABC):
         except InputError as error:
             if not str(error).startswith("start:"):  # a system may have no start where all is zero
                 raise
+
+    def _tables_over_time(self) -> dict[str, str]:
+        """What signals are called where they are arguments."""
+        return {f"signal[{k + 1}]": f"inputs.{name}" for k, name in enumerate(self._signals)}
 
     def __getstate__(self) -> dict[str, Any]:
         """Without what is found out again: for pickles, and for copies, which get other numbers."""
@@ -171,10 +188,10 @@ class System(ABC):
 
     def simulate(
         self,
-        duration: float | None = None,
+        duration: float | str | None = None,
+        start: Mapping[str, object] | None = None,
         *,
         t: ArrayLike | None = None,
-        start: Mapping[str, object] | None = None,
         inputs: Mapping[str, object] | None = None,
         events: Mapping[str, Event] | None = None,
         method: str | None = None,
@@ -197,7 +214,7 @@ class System(ABC):
         Parameters
         ----------
         duration : float, optional
-            How long, in s. Left out, the last of the times ``t``.
+            How long, in s, or as ``"1 min"``. Left out, the last of the times ``t``.
         t : array_like, optional
             Times of the rows, in s, increasing from 0 on. Left out, there is a row every ``every`` steps, or every
             ``interval`` seconds; without these, some hundreds or a few thousand evenly in time, and the last state.
@@ -238,11 +255,13 @@ class System(ABC):
         TrustWarning
             How far the rows can be trusted, where that is less than was asked for.
         """
+        begin = starts_of("simulate", self, start, starts, System.simulate.__kwdefaults__ or ())
         times, duration = span_of("simulate", duration, t)
         if step is None and tolerance is None and accuracy is None:
             accuracy = 1e-9
-        tables = self.held(mapping("inputs", inputs)).tables()
-        tables["start"] = starts_of("simulate", self, start, starts, System.simulate.__kwdefaults__ or ())
+        system = self.held(mapping("inputs", inputs))
+        tables = system.tables()
+        tables["start"] = begin
         tables["run"] = {
             "duration": duration,
             "method": method,
@@ -264,6 +283,7 @@ class System(ABC):
         expressions, functions = events_of(events)
         tables["event"] = expressions
         names = {f"event[{k + 1}]": f"events.{one['name']}" for k, one in enumerate(expressions)}
+        names |= system._tables_over_time()
         text = _toml.document(tables)
         with bar(duration, progress) as told, plainly(names):
             result = _core.simulate(text, "pendula", [], functions, told, *places(), tell)
@@ -313,7 +333,10 @@ class Chain(System):
         drives: Sequence[Mapping[str, object]] = (),
         feedback: Sequence[Mapping[str, object]] = (),
         units: str | None = None,
+        **others: Never,
     ) -> None:
+        for name in others:
+            raise unknown("Chain", name, ["masses", "lengths", *(Chain.__init__.__kwdefaults__ or ())])
         self._numbers: dict[str, object] = copy.deepcopy(
             {
                 "space": space,
@@ -394,14 +417,6 @@ class Chain(System):
         return {
             "gravity": self._numbers["gravity"],
             **{name: self._per_link(name) for name in ("masses", "lengths", "damping")},
-        }
-
-    @property
-    def units(self) -> dict[str, str]:
-        """Of coordinates, rates, inputs and parameters, by name."""
-        known = self._info.units
-        return {
-            name: known[name] for name in (*self.coordinates, *self.rates, *self.inputs, *self.parameters)
         }
 
     def _per_link(self, name: str) -> NDArray[np.float64]:

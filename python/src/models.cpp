@@ -1,5 +1,6 @@
 // What models have: names, units, defaults, and how their kernels run.
 
+#include <nanobind/stl/map.h>
 #include <nanobind/stl/optional.h>
 #include <nanobind/stl/pair.h>
 #include <nanobind/stl/string.h>
@@ -7,6 +8,7 @@
 #include <nanobind/stl/vector.h>
 
 #include <cstddef>
+#include <map>
 #include <optional>
 #include <pendula/run/quantity.hpp>
 #include <span>
@@ -19,6 +21,7 @@
 #include "bindings.hpp"
 #include "io/generator.hpp"
 #include "io/kernel_cache.hpp"
+#include "io/quantity_text.hpp"
 #include "prepared.hpp"
 #include "toolchain.hpp"
 
@@ -32,6 +35,7 @@ struct ModelInfo {
   int links = 1;
   Named coordinates, rates, inputs;
   std::vector<std::tuple<std::string, std::string, double>> parameters;  // with defaults, NaN where there is none
+  std::map<std::string, std::string> units;                              // of all of these
   std::vector<std::string> points;
   std::string kernel_by, kernel_file;
 };
@@ -56,14 +60,23 @@ ModelInfo describe_model(const std::string& model, std::optional<int> links, con
                  .rates = {},
                  .inputs = named(info.inputs, info.input_units),
                  .parameters = {},
+                 .units = {},
                  .points = {info.points.begin(), info.points.end()},
                  .kernel_by = std::string(kernel.by()),
                  .kernel_file = kernel.file.string()};
   for (const auto& [name, unit] : told.coordinates) told.rates.emplace_back(rate_name(name), rate_unit(unit));
   for (std::size_t k = 0; k < info.own_parameters(); ++k) {
     told.parameters.emplace_back(info.parameters[k], info.parameter_units[k], info.parameter_defaults[k]);
+    told.units.emplace(info.parameters[k], info.parameter_units[k]);
   }
+  for (const Named& names : {told.coordinates, told.rates, told.inputs}) told.units.insert(names.begin(), names.end());
   return told;
+}
+
+/// The number in a text with a unit, as an input or a parameter has it; nothing if it is none.
+std::optional<double> with_unit(const ModelInfo& info, const std::string& text, const std::string& name) {
+  const auto unit = info.units.find(name);
+  return unit == info.units.end() ? std::nullopt : io::with_unit(text, unit->second);
 }
 
 }  // namespace
@@ -75,9 +88,11 @@ void define_models(nb::module_& module) {
       .def_ro("rates", &ModelInfo::rates)
       .def_ro("inputs", &ModelInfo::inputs)
       .def_ro("parameters", &ModelInfo::parameters)
+      .def_ro("units", &ModelInfo::units)
       .def_ro("points", &ModelInfo::points)
       .def_ro("kernel_by", &ModelInfo::kernel_by)
-      .def_ro("kernel_file", &ModelInfo::kernel_file);
+      .def_ro("kernel_file", &ModelInfo::kernel_file)
+      .def("with_unit", &with_unit, nb::arg("text"), nb::arg("name"));
   module.def("describe_model", &describe_model, nb::arg("model"), nb::arg("links").none(), nb::arg("program"),
              nb::arg("python"), nb::arg("tell"));
   module.def(

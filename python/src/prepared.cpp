@@ -1,6 +1,7 @@
 #include "prepared.hpp"
 
 #include <nanobind/stl/map.h>
+#include <nanobind/stl/optional.h>
 #include <nanobind/stl/shared_ptr.h>
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/vector.h>
@@ -63,19 +64,36 @@ std::map<std::string, std::vector<double>> constants_of(const Prepared& made) {
   return values;
 }
 
-/// Units of coordinates, rates, inputs and parameters, by name.
-std::map<std::string, std::string> units_of(const Prepared& made) {
-  const std::optional<io::NaturalUnits> natural =
-      std::visit([](const auto& scenario) { return scenario.natural; }, made.scenario);
+std::optional<io::NaturalUnits> natural_units_of(const Prepared& made) {
+  return std::visit([](const auto& scenario) { return scenario.natural; }, made.scenario);
+}
+
+/// Units in SI of coordinates, rates, inputs and parameters, by name.
+std::map<std::string, std::string> si_units_of(const Prepared& made) {
   std::map<std::string, std::string> units;
-  for (const Constant& one : made.subject->constants()) units[one.name] = io::in_units(natural, one.unit);
-  for (const std::string& input : input_names(*made.subject)) units[input] = io::in_units(natural, "N m");
+  for (const Constant& one : made.subject->constants()) units[one.name] = one.unit;
+  for (const std::string& input : input_names(*made.subject)) units[input] = "N m";
   const std::vector<std::string> columns = made.subject->columns();
   for (const Quantity& quantity : made.subject->quantities()) {
-    for (std::size_t k = 0; k < quantity.size(); ++k)
-      units[columns[quantity.column(k)]] = io::in_units(natural, quantity.unit);
+    for (std::size_t k = 0; k < quantity.size(); ++k) units[columns[quantity.column(k)]] = quantity.unit;
   }
   return units;
+}
+
+/// The same in the scenario's own units.
+std::map<std::string, std::string> units_of(const Prepared& made) {
+  std::map<std::string, std::string> units = si_units_of(made);
+  for (auto& [name, unit] : units) unit = io::in_units(natural_units_of(made), unit);
+  return units;
+}
+
+/// The number in a text with a unit, in the unit of what has this name; nothing if it is none.
+std::optional<double> with_unit(const Prepared& made, const std::string& text, const std::string& name) {
+  const std::optional<io::NaturalUnits> natural = natural_units_of(made);
+  const io::BaseUnits base = natural ? io::BaseUnits{natural->mass, natural->length, natural->time} : io::BaseUnits{};
+  const std::map<std::string, std::string> units = si_units_of(made);
+  const auto unit = units.find(name);
+  return unit == units.end() ? std::nullopt : io::with_unit(text, unit->second, base);
 }
 
 void require_continuous(const io::RunPlan& plan) {
@@ -137,12 +155,9 @@ void define_prepared(nb::module_& module) {
       .def_prop_ro(
           "start", [](const Prepared& made) { return vector_of(state_of(made.start)); }, nb::rv_policy::move)
       .def_prop_ro("units", &units_of)
+      .def("with_unit", &with_unit, nb::arg("text"), nb::arg("name"))
       .def_prop_ro("constants", &constants_of)
-      .def_prop_ro("is_natural",
-                   [](const Prepared& made) {
-                     return std::visit([](const auto& scenario) { return scenario.natural.has_value(); },
-                                       made.scenario);
-                   })
+      .def_prop_ro("is_natural", [](const Prepared& made) { return natural_units_of(made).has_value(); })
       .def_prop_ro("time", [](const Prepared& made) { return made.start.time; })
       .def_ro("warnings", &Prepared::warnings);
   module.def("check", &check, nb::arg("text"), nb::arg("program"), nb::arg("python"), nb::arg("tell"));

@@ -27,6 +27,7 @@ struct Result {
   std::vector<std::vector<std::size_t>> points;  ///< columns of the components of each
   std::vector<std::size_t> state;                ///< columns of the coordinates, then of their rates
   double begin = 0;                              ///< of the motion, where rows may begin later  [s]
+  bool loaded = false;                           ///< whether its energy may change
   std::vector<double> rows, event_rows;          ///< one after the other
   std::vector<std::string> events;               ///< names, one for each of event_rows
   std::vector<char> went_up;                     ///< the same

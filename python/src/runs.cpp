@@ -259,6 +259,7 @@ Table table_of(const Result& result, const std::vector<double>& numbers) {
 void describe(const RunSetup& setup, io::RunContents contents, const view::Scene& scene, Result& result) {
   const Subject& subject = *setup.subject;
   result.begin = setup.start.time;
+  result.loaded = subject.loaded();
   contents.drawing = view::drawing_of(scene);
   for (const view::Point& point : scene.points) {
     std::vector<std::size_t>& columns = result.points.emplace_back();
@@ -297,6 +298,7 @@ void define_runs(nb::module_& module) {
       .def_ro("state", &Result::state)
       .def_ro("points", &Result::points)
       .def_ro("begin", &Result::begin)
+      .def_ro("loaded", &Result::loaded)
       .def_ro("summary", &Result::summary)
       .def_ro("events", &Result::events)
       .def_prop_ro("event_names", [](const Result& result) { return result.contents.events; })

@@ -181,6 +181,11 @@ def test_errors_name_the_line_of_the_function_and_near_names(tmp_path, monkeypat
             r"mine\.py:11: swing: expected to use names that are known, got thet; did you mean theta",
         ),
         ("sin(theta)", r"mine\.py:11: .* got sin; SymPy has it: from sympy import sin$"),
+        (
+            "__import__('math').cos(theta)",
+            r"mine\.py:11: TypeError: .*; take SymPy's: from sympy import cos",
+        ),
+        ("__import__('numpy').cos(theta)", r"mine\.py:11: .*; take SymPy's: from sympy import cos"),
         ("model.parametr('a', '1')", r"mine\.py:11: AttributeError: .*; did you mean parameter "),
         ("1 / 0", r"mine\.py:11: ZeroDivisionError"),
         ("theta * 'a'", r"mine\.py:11: "),

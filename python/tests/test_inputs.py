@@ -68,12 +68,38 @@ def test_what_is_wrong_is_told() -> None:
     for given, message in (
         (lambda t: t, r"inputs\.push: expected a number, \(times, values\) or a CSV file, got function"),
         ((TIMES,), r"inputs\.push: expected \(times, values\), got 1 of them"),
-        (([0, 0], [1, 2]), r"signals\[0\]\.times\[2\]: expected a time after the one before it"),
-        (([0, 1], [1]), r"signals\[0\]\.values: expected as many numbers as times has, 2"),
+        (([0, 0], [1, 2]), r"^inputs\.push\.times\[2\]: expected a time after the one before it"),
+        (([0, 1], [1]), r"^inputs\.push\.values: expected as many numbers as times has, 2"),
         ("none.csv", r"none\.csv: expected a CSV file that can be read"),
+        ("5 cm", r"inputs\.push: expected a finite number or a string in N, got '5 cm'"),
         ({"time": TIMES}, r"inputs\.push: expected some of file, column, times, values, hold, got time"),
     ):
         with pytest.raises(pendula.InputError, match=message):
             pushed(given)
-    with pytest.raises(pendula.InputError, match="signal: expected a system without signals"):
+    with pytest.raises(pendula.InputError, match=r"^inputs: expected numbers, got tables over time"):
         pendula.Simulation(pendula.Model("cart_chain", links=1, inputs={"push": (TIMES, PUSHES)}), START)
+
+
+def test_numbers_may_have_units() -> None:
+    cart = pendula.Model("cart_chain", links=1, inputs={"push": "100 mN"})
+    assert cart == pendula.Model("cart_chain", links=1, inputs={"push": 100 * 1e-3})
+    run = CART.simulate("10 ms", START, inputs={"push": "100 mN"})
+    assert run.t[-1] == 10 * 1e-3 and run["push"][-1] == 100 * 1e-3
+
+
+def test_a_motion_is_told_to_be_no_input(tmp_path: Path) -> None:
+    (tmp_path / "pulled.py").write_text(
+        "def define(model, links):\n"
+        "    theta, rope = model.coordinate('theta', 'rad'), model.motion('rope', 'm', default=1.0)\n"
+        "    model.lagrangian = rope**2 * model.rate(theta)**2 / 2 - theta**2\n"
+    )
+    pulled = pendula.Model(tmp_path / "pulled.py")
+    for call in (
+        lambda: pendula.Model(tmp_path / "pulled.py", inputs={"rope": 2.0}),
+        lambda: pulled.simulate(1.0, inputs={"rope": 2.0}),
+        lambda: pendula.Simulation(pulled).step(0.1, rope=2.0),
+    ):
+        with pytest.raises(
+            pendula.InputError, match=r'^inputs: expected none, got rope; a motion .* drives=\[\{"input"'
+        ):
+            call()

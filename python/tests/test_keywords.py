@@ -48,3 +48,22 @@ def test_a_start_is_given_by_keywords_or_a_mapping(take):
 def test_a_keyword_that_is_none_is_no_start(take, wrong, told):
     with pytest.raises(pendula.InputError, match=f"^{take}: unknown keyword {wrong}.*{told}"):
         TAKE[take](**FIRST, **{wrong: 1e-9})
+
+
+def test_a_start_may_stand_after_the_duration():
+    assert np.array_equal(CART.simulate(0.1, FIRST).y, CART.simulate(0.1, **FIRST).y)
+
+
+@pytest.mark.parametrize("call", [pendula.Model.simulate, pendula.differentiate, pendula.ensemble])
+def test_the_word_of_scipy_is_told_where_the_duration_is_missing(call):
+    with pytest.raises(pendula.InputError, match="unknown keyword t_span: here it is duration="):
+        call(CART, t_span=(0, 1), **FIRST)
+
+
+def test_keywords_are_listed_once_and_not_by_older_names():
+    with pytest.raises(pendula.InputError) as refused:
+        CART.simulate(0.1, nonsense=1)
+    listed = str(refused.value).split("expected some of ")[1].split(", ")
+    assert len(listed) == len(set(listed)) and "theta_dot_1" in listed and "theta_1_dot" not in listed
+    older, present = CART.simulate(0.1, theta_1_dot=1.0), CART.simulate(0.1, theta_dot_1=1.0)
+    assert np.array_equal(older.y, present.y) and older.y.any()

@@ -39,7 +39,7 @@ REFUSED = {
     "ragged times": (simulate(t=[[0], [0, 1]]), "t", "inhomogeneous"),
     "lengths of three": (chain(masses=[1, 1], lengths=[1, 1, 1]), "lengths", "3|1, 1, 1"),
     "damping of three": (chain(masses=[1, 1], damping=[1, 1, 1]), "damping", "3|1, 1, 1"),
-    "times in sol": (lambda: RUN.sol([[0.1]]), "t", r"\[\[0.1\]\]"),
+    "times in sol": (lambda: RUN.sol([[0.1]]), "t", r"shape \(1, 1\)"),
     "times after the end": (lambda: RUN.sol(7.0), "t", "7.0"),
     # numbers that are none
     "NaN": (simulate(theta=NAN), "theta", "nan"),
@@ -67,6 +67,8 @@ REFUSED = {
     "unknown parameter": (model("furuta", nothing=1.0), "nothing", "unknown key"),
     "unknown input": (lambda: CART.simulate(0.1, inputs={"pull": 1.0}), "input", "pull"),
     "unknown drive": (model("cart_chain", drives=[{"input": "pull"}]), r"drives\[0\].input", "pull"),
+    "unknown keyword of a chain": (chain(length=1.0), "Chain", "length; did you mean lengths"),
+    "unknown keyword of a model": (model("cart_chain", linkz=1), "Model", "linkz; did you mean links"),
     "unknown link": (
         chain(links=2, drives=[{"link": 3, "amplitude": 1, "frequency": 1}]),
         r"drives\[0\].link",

@@ -120,6 +120,26 @@ def test_what_an_extra_brings_is_named(monkeypatch):
                 work()
 
 
+def test_a_run_is_a_mapping_by_names():
+    run = pendula.Chain(links=2).simulate(0.1, theta=1.0)
+    assert list(run) == run.columns and "theta_1" in run and "theta" in run
+    assert "foo" not in run and 0 not in run
+    for name in ("foo", 0):
+        with pytest.raises(KeyError, match=f"{name}: expected one of t, theta_1, "):
+            run[name]
+
+
+def test_what_changes_energy_makes_no_error():
+    chain = {"masses": [1, 1]}
+    free = pendula.Chain(**chain).simulate(1.0, theta=1.0)
+    damped = pendula.Chain(**chain, damping=0.1).simulate(1.0, theta=1.0)
+    pushed = pendula.Chain(**chain).simulate(1.0, theta=1.0, inputs={"torque_1": ([0, 1], [0, 1])})
+    held = pendula.Model("cart_chain", inputs={"push": 2.0}).simulate(1.0, theta=1.0)
+    assert ", energy error " in repr(free)
+    for run in (damped, pushed, held):
+        assert ", energy change " in repr(run)
+
+
 def test_columns_of_a_model_have_their_names():
     run = pendula.Model("furuta").simulate(0.5)
     assert run.y.shape[0] == 4 and run["energy"].shape == run.t.shape

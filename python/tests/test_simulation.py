@@ -162,10 +162,34 @@ def test_inputs_are_held_all_or_none():
     simulation = pendula.Simulation(DOUBLE, theta=0.1)
     with pytest.raises(pendula.InputError, match="got bogus"):
         simulation.hold(torque_2=7.0, bogus=3.0)
-    with pytest.raises(pendula.InputError, match=r"torque_1: expected a finite number, got '3'"):
+    with pytest.raises(
+        pendula.InputError, match=r"torque_1: expected a finite number or a string in N m, got '3'"
+    ):
         simulation.hold({"torque_2": 7.0, "torque_1": "3"})
     assert simulation.inputs == {"torque_1": 0.0, "torque_2": 0.0}
     assert simulation.hold({"torque_1": 1}, torque_2=2.0).inputs == {"torque_1": 1.0, "torque_2": 2.0}
+
+
+def test_numbers_may_have_units():
+    plain = pendula.Simulation(DOUBLE, theta=0.1).step(0.01, torque_1=0.1, torque_2=0.1).advance_to(0.02)
+    units = pendula.Simulation(DOUBLE, theta=0.1).step("10 ms", torque="10 N cm").advance_to("20 ms")
+    assert units.inputs == plain.inputs and np.array_equal(units.state, plain.state)
+    assert np.array_equal(units.at("5 ms"), plain.at(0.005))
+    for call in (pendula.lyapunov, lambda *given, **more: pendula.differentiate(*given, **more).y):
+        assert np.array_equal(call(DOUBLE, "1 s", theta=0.1)[0], call(DOUBLE, 1.0, theta=0.1)[0])
+    assert np.array_equal(pendula.linearize(DOUBLE, step="100 ms").A, pendula.linearize(DOUBLE, step=0.1).A)
+    with pytest.raises(
+        pendula.InputError, match="duration: expected a finite number or a string in s, got '1 m'"
+    ):
+        plain.step("1 m")
+
+
+def test_units_of_a_natural_system_are_converted():
+    natural = pendula.Chain(
+        links=1, gravity=10.0, lengths=0.4, units="natural"
+    )  # a time of 0.2 s, an energy of 4 J
+    simulation = pendula.Simulation(natural, theta=0.1).step("400 ms", torque_1="8 N m")
+    assert abs(simulation.time - 2) < 1e-15 and abs(simulation.inputs["torque_1"] - 2) < 1e-15  # measured 0
 
 
 # Ctrl-C within a tenth of a second: seen 0.05 s; with room for a machine that does other things, too.

@@ -24,6 +24,9 @@ def test_a_chain_tells_what_it_has_as_a_model_does():
     }
     told = pendula.Chain(masses=["100 g", 2], lengths="50 cm")
     assert np.array_equal(told.masses, [0.1, 2]) and np.array_equal(told.lengths, [0.5, 0.5])
+    cart = pendula.Model("cart_chain", links=2, cart_mass="500 g", masses=["100 g", 2])
+    assert cart.parameters["cart_mass"] == 0.5 and cart.parameters["masses"] == [0.1, 2]
+    assert cart == pendula.Model("cart_chain", links=2, cart_mass=0.5, masses=[0.1, 2])
     whirl = pendula.Chain(links=2, space="spatial")
     assert whirl.coordinates == ["theta_1", "theta_2", "phi_1", "phi_2"] and whirl.links == 2
     assert whirl.inputs[:3] == ["torque_x_1", "torque_y_1", "torque_z_1"]
@@ -58,12 +61,12 @@ def test_systems_are_equal_that_move_alike():
         (lambda: pendula.Model("furuto"), "model: expected .*did you mean furuta"),
         (
             lambda: pendula.Model("furuta", nothing=1.0),
-            "nothing: expected one of arm_inertia, .* got the unknown key",
+            "unknown keyword nothing, expected some of arm_inertia, .* links",
         ),
         (lambda: pendula.Model("cart_chain", cart_mass=-1.0), "cart_mass: expected .* got -1"),
         (
             lambda: pendula.Model("cart_chain", inputs={"pull": 1.0}),
-            r"inputs\.pull\.input: expected .*push.* got .*pull",
+            "inputs: expected some of push, got pull",
         ),
         (
             lambda: pendula.Model("cart_chain", feedback=[{"input": "push", "value": "-z"}]),

@@ -12,6 +12,7 @@
 #include "cli/help.hpp"
 #include "io/errors.hpp"
 #include "io/nearest_name.hpp"
+#include "io/quantity_text.hpp"
 
 namespace pendula::cli {
 namespace {
@@ -267,10 +268,12 @@ void CommandLine::add_linearize() {
   linearize->get_option("SCENARIO")->required();
   takes_words(linearize->add_option("--at", options.at, "Beside the start, or an equilibrium near it"), "PLACE",
               {"start", "equilibrium"});
-  linearize->add_option("--step", options.step, "The discrete system, over so many seconds, while inputs are held")
-      ->type_name("SECONDS")
-      ->check(expect("a positive number", [](const std::string& text) {
-        const double step = read_number<double>(text).value_or(0);
+  linearize
+      ->add_option("--step", options.step,
+                   "The discrete system, over so many seconds or, say, 10ms, while inputs are held")
+      ->type_name("TIME")
+      ->check(expect("a positive time", [](const std::string& text) {
+        const double step = io::number_or_quantity(text, "s").value_or(0);
         return step > 0 && std::isfinite(step);
       }));
   add_set(linearize, options.overrides);

@@ -151,7 +151,7 @@ struct LinearizeOptions {
   std::string scenario;                ///< the file
   std::vector<std::string> overrides;  ///< `key.path=value`
   std::string at = "start";            ///< or "equilibrium"
-  std::optional<double> step;          ///< of the discrete system; else the continuous one  [s]
+  std::string step;                    ///< of the discrete system, "0.01" or "10 ms"; empty: the continuous one
   bool json = false;
 };
 

@@ -23,6 +23,7 @@
 #include "cli/interrupt.hpp"
 #include "cli/read_scenario.hpp"
 #include "io/errors.hpp"
+#include "io/quantity_text.hpp"
 #include "io/row_slopes.hpp"
 #include "io/scenario_run.hpp"
 
@@ -34,6 +35,7 @@ struct Linear {
   Motion at;
   std::vector<std::string> names, inputs, outputs;
   Directions<> a, b, c, d;
+  std::optional<double> step;  ///< from one time to the next; nothing: continuous
 };
 
 /// How an eigenvalue swings, as exp((-damping w + i …) t) does: w in Hz, undamped, and the damping ratio.
@@ -86,12 +88,14 @@ Linear linear_of(const Scenario& scenario, const LinearizeOptions& options, cons
                 .a = {},
                 .b = {},
                 .c = {},
-                .d = {}};
+                .d = {},
+                .step = {}};
   const Eigen::Index n = 2 * linear.at.q.size();
   linear.a.resize(n, n);
   linear.b.resize(n, static_cast<Eigen::Index>(linear.inputs.size()));
-  if (options.step) {
-    make_discrete(*subject, scenario.run, *options.step, guard, linear);
+  if (!options.step.empty()) {
+    linear.step = io::number_or_quantity(options.step, "s", {.time = scenario.natural ? scenario.natural->time : 1});
+    make_discrete(*subject, scenario.run, *linear.step, guard, linear);
   } else {
     linearize(*subject, linear.at, linear.a.data(), linear.b.data());
   }
@@ -122,9 +126,9 @@ void print_json(const Linear& linear, const LinearizeOptions& options, const Eig
                               {"t", linear.at.time},          {"names", linear.names},  {"inputs", linear.inputs},
                               {"state", state_of(linear.at)}, {"A", rows_of(linear.a)}, {"B", rows_of(linear.b)},
                               {"outputs", linear.outputs},    {"C", rows_of(linear.c)}, {"D", rows_of(linear.d)}};
-  if (options.step) json["step"] = *options.step;
+  if (linear.step) json["step"] = *linear.step;
   for (const std::complex<double>& one : eigenvalues) {
-    const Swing swing = swing_of(one, options.step);
+    const Swing swing = swing_of(one, linear.step);
     json["eigenvalues"].push_back({one.real(), one.imag()});
     json["frequencies"].push_back(swing.frequency);
     json["damping"].push_back(swing.damping);
@@ -148,8 +152,8 @@ void print_matrix(const Directions<>& matrix, const std::vector<std::string>& ro
   }
 }
 
-void print_text(const Linear& linear, const LinearizeOptions& options, const Eigen::VectorXcd& eigenvalues) {
-  std::cout << (options.step ? "x(t + " + shortest(*options.step) + ") = A x(t) + B u" : "dx/dt = A x + B u")
+void print_text(const Linear& linear, const Eigen::VectorXcd& eigenvalues) {
+  std::cout << (linear.step ? "x(t + " + shortest(*linear.step) + ") = A x(t) + B u" : "dx/dt = A x + B u")
             << ", x a deviation from\n\n";
   const std::vector<double> state = state_of(linear.at);
   for (std::size_t k = 0; k < state.size(); ++k) {
@@ -170,7 +174,7 @@ void print_text(const Linear& linear, const LinearizeOptions& options, const Eig
   for (const std::complex<double>& one : eigenvalues) {
     std::cout << std::setw(15) << (std::abs(one.real()) < smallest ? "0" : rounded(one.real(), 6));
     if (std::abs(one.imag()) >= smallest) {
-      const Swing swing = swing_of(one, options.step);
+      const Swing swing = swing_of(one, linear.step);
       const double damping = std::abs(swing.damping) < 1e-12 ? 0 : swing.damping;
       const std::string imaginary = (one.imag() < 0 ? " - " : " + ") + rounded(std::abs(one.imag()), 6) + " i";
       std::cout << std::left << std::setw(17) << imaginary << std::right << std::setw(13) << rounded(swing.frequency, 6)
@@ -194,7 +198,7 @@ ExitStatus linearize(const LinearizeOptions& options) {
   if (options.json)
     print_json(linear, options, rates);
   else
-    print_text(linear, options, rates);
+    print_text(linear, rates);
   return done;
 }
 

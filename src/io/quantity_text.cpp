@@ -39,7 +39,7 @@ constexpr Dimension mass{1, 0, 0, 0}, length{0, 1, 0, 0}, time_span{0, 0, 1, 0},
 constexpr Dimension turning{0, 0, -1, 1}, force{1, 1, -2, 0}, energy{1, 2, -2, 0}, work_rate{1, 2, -3, 0};
 
 /// A turn a second is 1 Hz: where an angular frequency is expected, 2 pi rad/s.
-constexpr std::array<NamedUnit, 31> named_units = {{
+constexpr std::array<NamedUnit, 35> named_units = {{
     {"1", {}},
     {"kg", {mass}},
     {"g", {mass, 1e-3}},
@@ -50,9 +50,13 @@ constexpr std::array<NamedUnit, 31> named_units = {{
     {"cm", {length, 1e-2}},
     {"mm", {length, 1e-3}},
     {"um", {length, 1e-6}},
+    {"\u00b5m", {length, 1e-6}},  // the micro sign; below the Greek letter
+    {"\u03bcm", {length, 1e-6}},
     {"s", {time_span}},
     {"ms", {time_span, 1e-3}},
     {"us", {time_span, 1e-6}},
+    {"\u00b5s", {time_span, 1e-6}},
+    {"\u03bcs", {time_span, 1e-6}},
     {"min", {time_span, 60}},
     {"h", {time_span, 3600}},
     {"rad", {angle}},
@@ -171,6 +175,11 @@ std::optional<double> with_unit(std::string_view text, std::string_view unit, co
   const double plain =
       wanted->size * std::pow(base.mass, of.kg) * std::pow(base.length, of.m) * std::pow(base.time, of.s);
   return quantity->value * (given->size / plain);
+}
+
+std::optional<double> number_or_quantity(std::string_view text, std::string_view unit, const BaseUnits& base) {
+  const std::optional<TextWithUnit> quantity = read_quantity(text);
+  return quantity && quantity->unit.empty() ? std::optional(quantity->value) : with_unit(text, unit, base);
 }
 
 std::string_view kind_of_unit(std::string_view unit) {

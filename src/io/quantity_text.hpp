@@ -32,6 +32,9 @@ std::optional<TextWithUnit> read_quantity(std::string_view text);
 /// it is none, or one of another kind.
 std::optional<double> with_unit(std::string_view text, std::string_view unit, const BaseUnits& base = {});
 
+/// The same of a text that may be a plain number.
+std::optional<double> number_or_quantity(std::string_view text, std::string_view unit, const BaseUnits& base = {});
+
 /// What a unit measures, in a word or two: "a length"; empty if it is no unit, or none that has a name.
 std::string_view kind_of_unit(std::string_view unit);
 

@@ -38,6 +38,24 @@ def test_points_are_measured_and_eigenvalues_have_frequencies_and_damping(pendul
     assert "C, of y = C x" in text and f"{wanted[0]:.6g} Hz" in text
 
 
+def test_a_step_may_have_a_unit(pendula, double):
+    plain, unit = (pendula("linearize", double, "--json", "--step", step).json for step in ("0.01", "10 ms"))
+    assert plain == unit and unit["step"] == 0.01
+    natural = [
+        "linearize",
+        double,
+        "--json",
+        "--set",
+        "chain.units=natural",
+        "--set",
+        "chain.lengths=9.81",
+        "--step",
+    ]
+    assert pendula(*natural, "10 ms").json == pendula(*natural, "0.01").json  # of sqrt(l_1/g), here 1 s
+    natural[-2] = "chain.lengths=39.24"
+    assert pendula(*natural, "10 ms").json == pendula(*natural, "0.005").json
+
+
 def test_own_columns_are_measured_unless_they_have_no_slopes(pendula, double):
     columns = 'height = "1 - cos(theta_1)", fast = "theta_dot_2*y_2", all = "2*energy"'
     double.write_text(double.read_text() + f"\n[output]\ncolumns = {{ {columns} }}\n")
@@ -77,7 +95,8 @@ def test_an_equilibrium_is_that_near_the_start_and_leaves_what_does_not_matter(p
 @pytest.mark.parametrize(
     ("arguments", "status", "said"),
     [
-        (["--step", "0"], 2, "--step: expected a positive number, got 0"),
+        (["--step", "0"], 2, "--step: expected a positive time, got 0"),
+        (["--step", "10 mm"], 2, "--step: expected a positive time, got 10 mm"),
         (
             ["--step", "0.1", "--set", "run.method=rk4"],
             2,

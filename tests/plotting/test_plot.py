@@ -51,6 +51,15 @@ def swing(rows, turns=5.0):
     return Run("swing", columns)
 
 
+def test_a_legend_tells_that_it_shows_some(runs):
+    t = np.linspace(0, 1, 500)
+    columns = {name.format(k): np.sin(k * t) for name in ("theta_{}", "theta_dot_{}") for k in range(1, 10)}
+    title = figure([Run("whip", {"t": t, **columns})], Choice(("series",))).axes[0].get_legend().get_title()
+    assert title.get_text() == "7 of 9"
+    few = figure([read_run(runs / "double.h5")], Choice(("series",))).axes[0].get_legend().get_title()
+    assert few.get_text() == ""
+
+
 def test_the_motion_between_rows_is_drawn():
     """As a row a step leaves it: with straight lines the bob would leave its circle by 0.03."""
     series, phase, trace = figure([swing(61)], Choice(("series", "phase", "trace"))).axes
