@@ -28,10 +28,11 @@ struct AccuracyAim {
   /// The distance of a trial by steps of another kind from the finest trial, where that does not shrink with the
   /// tolerance; and since when they differ  [s].
   double disputed = 0, disputed_from = std::numeric_limits<double>::infinity();
+  double trials_end = 0;  ///< a run that goes on may end later  [s]
 
   template <class Numbers>
   void member(Numbers& numbers) {
-    numbers(tolerance, error);
+    numbers(tolerance, error, trusted_until, disputed, disputed_from, trials_end);
   }
 };
 
