@@ -448,6 +448,25 @@ def test_a_run_that_goes_on_is_looked_at_anew(pendula, scenario, tmp_path):
     assert resumed["warnings"] == [] and resumed["expected_error"] < 1e-9  # measured 7e-12
 
 
+def test_a_run_that_goes_on_keeps_what_is_known_of_its_beginning(pendula, scenario, tmp_path):
+    """Rows that trials have found right are not doubted for what comes after them, nor are others trusted again."""
+    by_itself = DOUBLE.replace("step     = 5e-3", "").replace("theta = 1.57", "theta = 0.3  # 1.57")
+    torque = '\n[[chain.signal]]\ninput = "torque_1"\ntimes = [0, 1]\nvalues = [0, 2]\n'
+    file = scenario(by_itself + torque)
+    begun = pendula("simulate", file, "--set", "run.duration=2", "-o", "run.h5", "--json").json
+    assert begun["trusted_until"] is None
+    resumed = pendula("simulate", "--resume", "run.h5", "--set", "run.duration=3", "--json").json
+    assert "rows after t = 2" in resumed["warnings"][0] and resumed["trusted_until"] >= 2
+    assert resumed["expected_error"] >= begun["expected_error"]
+
+    chaotic = scenario(by_itself.replace("0.3", "2.3"))
+    begun = pendula("simulate", chaotic, "--set", "run.duration=25", "-o", "run.h5", "--json").json
+    assert 5 < begun["trusted_until"] < 20
+    resumed = pendula("simulate", "--resume", "run.h5", "--set", "run.duration=26", "--json").json
+    assert resumed["expected_error"] is None
+    assert 0 <= resumed["trusted_until"] - begun["trusted_until"] < 1  # measured 0.3; once 0 s was told
+
+
 def test_the_python_of_the_documentation_runs(pendula, scenario, tmp_path, monkeypatch):
     page = Path(__file__).parents[2] / "docs/reference/run-file.md"
     blocks = re.findall(r"```python\n(.*?)```", page.read_text(), re.DOTALL)

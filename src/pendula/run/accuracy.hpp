@@ -28,10 +28,11 @@ struct AccuracyAim {
   /// The distance of a trial by steps of another kind from the finest trial, where that does not shrink with the
   /// tolerance; and since when they differ  [s].
   double disputed = 0, disputed_from = std::numeric_limits<double>::infinity();
+  double trials_end = 0;  ///< a run that goes on may end later  [s]
 
   template <class Numbers>
   void member(Numbers& numbers) {
-    numbers(tolerance, error);
+    numbers(tolerance, error, trusted_until, disputed, disputed_from, trials_end);
   }
 };
 
@@ -202,7 +203,7 @@ inline RunOptions of_other_kind(RunOptions run, double wanted) {
 /// they have to come to the finest trial; where they come no closer than `near`, that is the error.
 template <class RunTrial, class Apart>
 void hear_another(double wanted, double start, AccuracyAim& aim, double tolerance, RunTrial run, Apart apart) {
-  constexpr double near = 0.5, far = 10, closer = 0.3;  // of the wanted error; `closer` of the distance before
+  constexpr double near = 0.5, closer = 0.3;  // of the wanted error; of the distance before
   constexpr int most_trials = 3;
   double before = std::numeric_limits<double>::infinity();
   for (int trial = 0; trial < most_trials && tolerance >= smallest_tolerance; ++trial) {
@@ -214,7 +215,7 @@ void hear_another(double wanted, double start, AccuracyAim& aim, double toleranc
       if (off > near * wanted) aim.error = std::max(aim.error, off);
       return;
     }
-    if (off > far * wanted && off > closer * before) {
+    if (off > closer * before) {
       aim.disputed = off;
       aim.disputed_from = parted.within(close_to_wanted * wanted, start);
       return;

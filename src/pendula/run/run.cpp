@@ -148,6 +148,7 @@ bool Run::aim(const std::function<bool()>& stop) {
     const double first = other.method == setup_.options.method ? kept_.aim.tolerance : detail::aimed_at * wanted;
     detail::hear_another(wanted, start, kept_.aim, first, run_other, apart);
   }
+  kept_.aim.trials_end = start + setup_.duration;
   if (!stopped) follow_aim();
   return !stopped;
 }
@@ -316,7 +317,7 @@ void Run::come_by(const RowPlace& place, bool last) {
   for (Observer* observer : observers_) observer->keep(checkpoint);
 }
 
-// The trials say nothing about an end that was moved later.
+// A run that went on has two answers: that of the trials before it, and that of a second look at what is after them.
 void Run::doubt(RunReport& report, bool went_on, const std::function<bool()>& stop) {
   report.warnings = event_warnings(setup_.events, report.events);
   if (!setup_.doubted || (report.end != RunEnd::complete && report.end != RunEnd::event)) return;
@@ -325,12 +326,16 @@ void Run::doubt(RunReport& report, bool went_on, const std::function<bool()>& st
   };
   add(detail::of_energy(*setup_.subject, setup_.options, kept_.record.balance()));
   add(detail::of_pole(*setup_.subject, setup_.options, report));
-  if (is_aimed() && !went_on) {
+  if (is_aimed()) {
     std::optional<Separation> parted;
     if (track_ && kept_.aim.finest) parted.emplace(*setup_.subject, *track_, *kept_.aim.finest);
     add(detail::of_aim(setup_, parted, kept_.aim, report.trust));
-  } else if (track_) {
+  }
+  if (track_ && (!is_aimed() || (went_on && std::isfinite(report.trust.expected_error)))) {
+    const Trust known = std::exchange(report.trust, {});
     add(look_again(report, stop));
+    report.trust.until = std::min(report.trust.until, known.until);
+    report.trust.expected_error = std::max(report.trust.expected_error, known.expected_error);
   }
   add(detail::of_defect(setup_, report.statistics.largest_defect, missed_, report.trust));
   add(detail::of_unseen(setup_, report.statistics, report.trust));
@@ -352,7 +357,9 @@ detail::Doubt Run::look_again(RunReport& report, const std::function<bool()>& st
       stopped = stopped || stop();
       return stopped || divergence.exceeds(track, detail::visible / look.trusted);
     });
-    return Separation(*setup_.subject, *track_, other);
+    Separation parted(*setup_.subject, *track_, other);
+    if (is_aimed()) parted.forget_until(kept_.aim.trials_end);  // of that the trials know more
+    return parted;
   };
   std::string unknown = "it was interrupted while it ran again to see how far it can be trusted: that is not known";
   const bool ends_between =

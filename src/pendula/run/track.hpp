@@ -279,6 +279,13 @@ class Separation {
     }
   }
 
+  /// From now on the two do not part up to `time`, where it is known otherwise how far they do.
+  void forget_until(double time) {
+    const auto later = std::ranges::find_if(places_, [&](const DistanceAt& place) { return place.time > time; });
+    for (auto place = places_.begin(); place != later; ++place) place->off = 0;
+    places_.insert(later, {time, 0});
+  }
+
   /// The largest distance.
   double largest() const {
     double largest = 0;
