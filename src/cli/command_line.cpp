@@ -176,9 +176,9 @@ void CommandLine::add_simulate() {
   SimulateOptions& options = simulate_options;
   simulate = app.add_subcommand("simulate", "Run a scenario; write its trajectory, print a summary");
   add_scenario(simulate, options.scenario);
-  CLI::Option* const resume = takes_file(
-      simulate->add_option("--resume", options.resume, "Go on with the run of this file to a later end"),
-      {".h5", ".hdf5", ".nc"});
+  CLI::Option* const resume =
+      takes_file(simulate->add_option("--resume", options.resume, "Go on with the run of this file to a later end"),
+                 {".h5", ".hdf5", ".nc"});
   resume->excludes(simulate->get_option("SCENARIO"));
   simulate->parse_complete_callback([&options] {
     if (options.scenario.empty() && !options.resume) throw CLI::RequiredError("SCENARIO");
