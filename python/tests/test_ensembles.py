@@ -255,9 +255,9 @@ def test_wrong_starts_are_named(start, message):
     ("given", "message"),
     [
         ({"steps": 3}, r"ensemble: unknown keyword steps; did you mean step\b"),
-        ({"duration": -1.0}, r"duration: expected a number, not negative, got -1\.0"),
-        ({"duration": float("nan")}, "duration: expected a finite number, got nan"),
-        ({"duration": "1"}, "duration: expected a finite number, got '1'"),
+        ({"duration": -1.0}, r"^duration: expected a finite number >= 0, got -1\.0"),
+        ({"duration": float("nan")}, "^duration: expected a finite number >= 0, got nan"),
+        ({"duration": "1"}, r'^duration: expected a finite number >= 0 or a string in s \(a time\), got "1"'),
         ({"threads": -1}, "threads: expected how many"),
         ({"threads": True}, "threads: expected how many"),
         ({"start": [1, 2]}, "start: expected a mapping by names, got list"),
@@ -291,6 +291,11 @@ def test_wrong_starts_are_named(start, message):
 def test_wrong_ensembles_are_named(given, message):
     with pytest.raises(pendula.InputError, match=message):
         pendula.ensemble(**{"system": DOUBLE, "duration": 1.0, "start": {"theta": [[0.1, 0.2]]}, **given})
+
+
+def test_a_duration_may_have_a_unit():
+    plain, unit = (pendula.ensemble(DOUBLE, one, {"theta": [[0.1, 0.2]]}) for one in (0.5, "500 ms"))
+    assert np.array_equal(plain["theta_2"], unit["theta_2"])
 
 
 def test_chaos_is_told_of_members():

@@ -50,7 +50,7 @@ constexpr std::array<NamedUnit, 35> named_units = {{
     {"cm", {length, 1e-2}},
     {"mm", {length, 1e-3}},
     {"um", {length, 1e-6}},
-    {"\u00b5m", {length, 1e-6}},  // the micro sign; below the Greek letter
+    {"\u00b5m", {length, 1e-6}},
     {"\u03bcm", {length, 1e-6}},
     {"s", {time_span}},
     {"ms", {time_span, 1e-3}},

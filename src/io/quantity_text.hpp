@@ -9,6 +9,8 @@ namespace pendula::io {
 
 inline constexpr double degree = std::numbers::pi / 180;
 inline constexpr std::string_view degree_sign = "\u00b0";
+/// Characters of units that are not ASCII: that one, the micro sign, and the Greek letter that looks like it.
+inline constexpr std::string_view unit_signs = "\u00b0\u00b5\u03bc";
 
 /// Units of mass, length and time in which plain numbers are; those of a natural scenario are not 1.
 struct BaseUnits {

@@ -191,7 +191,7 @@ bool is_bare_string(std::string_view text) {
   if (is_bare_word(text)) return true;
   const auto in_a_unit = [](char c) {
     return is_key_character(c) || std::string_view("/*^ ").find(c) != std::string_view::npos ||
-           degree_sign.find(c) != std::string_view::npos;
+           unit_signs.find(c) != std::string_view::npos;
   };
   const std::optional<TextWithUnit> quantity = read_quantity(text);
   if (!quantity || quantity->unit.empty() || (quantity->unit.front() >= '0' && quantity->unit.front() <= '9'))
