@@ -339,7 +339,7 @@ class SeriesSteps {
           inputs((static_cast<std::size_t>(order) + 1) * system_inputs + 1) {}
 
     L at(std::size_t order, std::size_t k) const { return from_row<L>(state[order * row + k]); }
-    SeriesRows rows(double* unit) {
+    SeriesRows rows(const double* unit) {
       return {.unit = unit, .state = state[0], .kept = kept[0], .operands = operands[0]};
     }
 
