@@ -23,57 +23,38 @@
 namespace pendula::test {
 namespace {
 
-std::vector<EnsembleMember> members(int count) {
+std::vector<RunSetup> members(int count) {
   Random random(3);
-  std::vector<EnsembleMember> members;
+  const RunRequest asked{
+      .options = {.stages = 4, .step = 0, .tolerance = 1e-8}, .duration = 1, .every = 1};
+  std::vector<RunSetup> members;
   for (int k = 0; k < count; ++k) {
     const auto subject = std::make_shared<ChainSubject<Planar>>(random_chain<Planar>(random, 2));
-    members.push_back({subject, random_state<Planar>(random, 2)});
+    members.push_back({asked, subject, random_state<Planar>(random, 2), false});
   }
   return members;
 }
 
-EnsembleSchedule schedule(int threads) {
-  EnsembleSchedule schedule;
-  schedule.options.step = 0;
-  schedule.options.stages = 4;
-  schedule.options.tolerance = 1e-8;
-  schedule.duration = 1;
-  schedule.threads = threads;
-  schedule.chunk = 3;
-  return schedule;
-}
-
-RunSetup setup_of(const EnsembleMember& member, const EnsembleSchedule& plan) {
-  return {.subject = member.subject,
-          .start = member.start,
-          .options = plan.options,
-          .duration = plan.duration,
-          .every = plan.every,
-          .doubted = false,
-          .events = plan.events};
-}
-
-std::vector<RunReport> reports(const std::vector<EnsembleMember>& all, const EnsembleSchedule& schedule) {
+std::vector<RunReport> reports(const std::vector<RunSetup>& all, int threads) {
   std::vector<RunReport> reports(all.size());
   std::mutex guard;
   std::vector<int> seen(all.size());
-  propagate(all, schedule, [&](std::size_t number, const RunReport& report) {
+  const auto observe = [&](std::size_t number, const RunReport& report) {
     const std::scoped_lock lock(guard);
     ++seen.at(number);
     reports.at(number) = report;
-  });
+  };
+  propagate(all, threads, observe, [] { return false; }, 3);
   EXPECT_EQ(seen, std::vector<int>(all.size(), 1));
   return reports;
 }
 
 TEST(Propagate, MovesEachMemberAsIfItWereAlone) {
-  const std::vector<EnsembleMember> all = members(10);
-  const std::vector<RunReport> by_one = reports(all, schedule(1)), by_three = reports(all, schedule(3));
+  const std::vector<RunSetup> all = members(10);
+  const std::vector<RunReport> by_one = reports(all, 1), by_three = reports(all, 3);
   for (std::size_t k = 0; k < all.size(); ++k) {
-    const RunSetup alone = setup_of(all[k], schedule(1));
-    ASSERT_TRUE(lane_kind(alone));
-    const RunReport expected = run_members({&alone, 1})[0];
+    ASSERT_TRUE(lane_kind(all[k]));
+    const RunReport expected = run_members({&all[k], 1})[0];
     ASSERT_EQ(expected.end, RunEnd::complete);
     for (const std::vector<RunReport>& found : {by_one, by_three}) {
       EXPECT_EQ(found[k].end, RunEnd::complete);
@@ -85,10 +66,10 @@ TEST(Propagate, MovesEachMemberAsIfItWereAlone) {
 }
 
 TEST(Propagate, AMemberThatFailsStopsNobodyElse) {
-  std::vector<EnsembleMember> all = members(7);
-  const std::vector<RunReport> expected = reports(all, schedule(1));
+  std::vector<RunSetup> all = members(7);
+  const std::vector<RunReport> expected = reports(all, 1);
   all[2].start.v[0] = std::numeric_limits<double>::infinity();
-  const std::vector<RunReport> found = reports(all, schedule(2));
+  const std::vector<RunReport> found = reports(all, 2);
   for (std::size_t k = 0; k < all.size(); ++k) {
     EXPECT_EQ(found[k].end == RunEnd::complete, k != 2) << k;
     if (k != 2) {
@@ -98,15 +79,15 @@ TEST(Propagate, AMemberThatFailsStopsNobodyElse) {
 }
 
 TEST(Propagate, WhatAnObserverThrowsEndsIt) {
-  const std::vector<EnsembleMember> all = members(20);
+  const std::vector<RunSetup> all = members(20);
   const auto refuse = [](std::size_t number, const RunReport&) {
     if (number == 4) throw std::runtime_error("enough");
   };
-  for (const int threads : {1, 2}) EXPECT_THROW(propagate(all, schedule(threads), refuse), std::runtime_error);
+  for (const int threads : {1, 2}) EXPECT_THROW(propagate(all, threads, refuse), std::runtime_error);
 }
 
 TEST(Propagate, OfNobodyIsNothing) {
-  EXPECT_TRUE(reports({}, schedule(2)).empty());
+  EXPECT_TRUE(reports({}, 2).empty());
 }
 
 // --- In lanes ---
@@ -123,12 +104,10 @@ class RunsInLanes : public testing::Test {
     for (int k = 0; k < count; ++k) {
       const Eigen::Index coordinates = Space::dof * links;
       const auto angles = random.matrix<Eigen::VectorXd>(coordinates, 1, -3, 3);
-      setups.push_back({.subject = std::make_shared<ChainSubject<Space>>(random_chain<Space>(random, links)),
-                        .start = Motion(0, angles, random.matrix<Eigen::VectorXd>(coordinates, 1, -4, 4)),
-                        .options = options,
-                        .duration = duration,
-                        .every = 7,
-                        .doubted = false});
+      setups.push_back({{.options = options, .duration = duration, .every = 7},
+                        std::make_shared<ChainSubject<Space>>(random_chain<Space>(random, links)),
+                        Motion(0, angles, random.matrix<Eigen::VectorXd>(coordinates, 1, -4, 4)),
+                        false});
     }
     return setups;
   }
@@ -441,12 +420,10 @@ TEST(RunsOfLoadedChains, SeeForcesThatDependOnTimeAlone) {
   parameters.gravity = 0;
   const double frequency = 10, end = 10;
   parameters.drives = {{.link = 0, .amplitude = Torque<Planar, 1>::Constant(1), .frequency = frequency, .phase = 0}};
-  RunSetup setup{.subject = std::make_shared<ChainSubject<Planar>>(Chain<Planar>(parameters)),
-                 .start = Motion(0, Eigen::VectorXd::Zero(1), Eigen::VectorXd::Zero(1)),
-                 .options = chosen(1e-6),
-                 .duration = end,
-                 .every = 1,
-                 .doubted = false};
+  RunSetup setup{{.options = chosen(1e-6), .duration = end, .every = 1},
+                 std::make_shared<ChainSubject<Planar>>(Chain<Planar>(parameters)),
+                 Motion(0, Eigen::VectorXd::Zero(1), Eigen::VectorXd::Zero(1)),
+                 false};
   const double expected = end / frequency - std::sin(frequency * end) / (frequency * frequency);
   for (const bool chooses_method : {false, true}) {
     setup.chooses_method = chooses_method;
@@ -581,13 +558,10 @@ TEST(ExponentsOfLoadedChains, AreFoundInLanes) {
       parameters.drives = {
           {.link = 0, .amplitude = Torque<Planar, 1>::Constant(3), .frequency = frequency, .phase = 0}};
     }
-    return RunSetup{
-        .subject = std::make_shared<ChainSubject<Planar>>(Chain<Planar>(parameters)),
-        .start = Motion(0, Eigen::VectorXd::Constant(damping.size(), 1), Eigen::VectorXd::Zero(damping.size())),
-        .options = chosen(1e-6),
-        .duration = 100,
-        .every = 1,
-        .doubted = false};
+    return RunSetup{{.options = chosen(1e-6), .duration = 100, .every = 1},
+                    std::make_shared<ChainSubject<Planar>>(Chain<Planar>(parameters)),
+                    Motion(0, Eigen::VectorXd::Constant(damping.size(), 1), Eigen::VectorXd::Zero(damping.size())),
+                    false};
   };
   std::vector<RunSetup> setups = {hung(Eigen::VectorXd::Constant(1, 0.3), 0),
                                   hung(Eigen::VectorXd::Constant(1, 2.0), 0), hung(Eigen::Vector2d(0.2, 0.1), 3),

@@ -307,7 +307,7 @@ std::vector<Event> random_events(Random& random, const Chain<Space>& chain, int 
 template <class Space>
 RunSetup swinging(Random& random, int links, const RunOptions& options, double duration, int events) {
   const Chain<Space> chain = random_chain<Space>(random, links);
-  RunSetup setup{std::make_shared<ChainSubject<Space>>(chain), random_state<Space>(random, links), options, duration};
+  RunSetup setup{{options, duration}, std::make_shared<ChainSubject<Space>>(chain), random_state<Space>(random, links)};
   setup.doubted = false;
   setup.events = random_events(random, chain, events);
   return setup;
@@ -399,11 +399,9 @@ INSTANTIATE_TEST_SUITE_P(Methods, RandomCrossings,
                          [](const auto& test) { return std::string(test.param.name); });
 
 RunSetup double_pendulum(std::vector<Event> events, double duration = 4) {
-  RunSetup setup{std::make_shared<ChainSubject<Planar>>(equal_chain<Planar>(2)),
-                 State<Planar>::from_angles(Eigen::Vector2d(1.5, 2)),
-                 {},
-                 duration,
-                 10};
+  RunSetup setup{{.duration = duration},
+                 std::make_shared<ChainSubject<Planar>>(equal_chain<Planar>(2)),
+                 State<Planar>::from_angles(Eigen::Vector2d(1.5, 2))};
   setup.options.stages = 6;
   setup.options.step = 0.01;
   setup.events = std::move(events);
@@ -480,9 +478,9 @@ TEST(Events, OfPairsNoneIsMissedThatIsDeeperThanTheErrorOfTheState) {
     for (const auto& [options, error] : all) {
       const double depth = std::pow(10, random.uniform(std::log10(10 * error), -2));
       RunSetup setup{
+          {options, 4},
           std::make_shared<ChainSubject<Planar>>(equal_chain<Planar>(1)),
-          State<Planar>::from_angles(Eigen::VectorXd::Constant(1, theta), Eigen::VectorXd::Constant(1, rate)), options,
-          4};
+          State<Planar>::from_angles(Eigen::VectorXd::Constant(1, theta), Eigen::VectorXd::Constant(1, rate))};
       setup.doubted = false;
       setup.events = {
           {"passes", [=](const Motion& motion) { return motion.q[0] - (highest - depth); }},

@@ -121,8 +121,9 @@ TEST_P(GrazingEvents, HappenTwiceOrNever) {
   int pairs = 0;
   for (int chain = 0; chain < chains; ++chain) {
     const int links = 1 + chain % 3;
-    RunSetup setup{std::make_shared<ChainSubject<Planar>>(random_chain<Planar>(random, links, chain % 2 == 1)),
-                   random_state<Planar>(random, links), GetParam().options, 3};
+    RunSetup setup{{GetParam().options, 3},
+                   std::make_shared<ChainSubject<Planar>>(random_chain<Planar>(random, links, chain % 2 == 1)),
+                   random_state<Planar>(random, links)};
     setup.doubted = false;
     std::vector<Event> turning, events;
     for (Eigen::Index k = 0; k < links; ++k) {

@@ -67,9 +67,8 @@ template <class Space>
 RunSetup whirling(Random& random, int links, const RunOptions& options) {
   const Eigen::VectorXd rates = random.matrix<Eigen::VectorXd>(Space::dof * links, 1, 5, 8);
   Eigen::VectorXd angles = random.matrix<Eigen::VectorXd>(Space::dof * links, 1, 0.5, 2.5);
-  RunSetup setup{std::make_shared<ChainSubject<Space>>(random_chain<Space>(random, links)), Motion(0, angles, rates),
-                 options, 3};
-  return setup;
+  return {{options, 3}, std::make_shared<ChainSubject<Space>>(random_chain<Space>(random, links)),
+          Motion(0, angles, rates)};
 }
 
 /// An expression that is narrow at a level of a column, and the levels where it crosses zero.
@@ -239,8 +238,9 @@ class EventsWithinBounds : public ::testing::TestWithParam<Bounding> {
   template <class Space>
   void compare(Random& random, int chain) {
     const int links = 1 + chain % 3;
-    RunSetup setup{std::make_shared<ChainSubject<Space>>(random_chain<Space>(random, links, chain % 2 == 1)),
-                   random_state<Space>(random, links), options(), 5};
+    RunSetup setup{{options(), 5},
+                   std::make_shared<ChainSubject<Space>>(random_chain<Space>(random, links, chain % 2 == 1)),
+                   random_state<Space>(random, links)};
     setup.doubted = false;
     const std::string last = std::to_string(links), turns = Space::dof == 1 ? "theta" : "phi";
     const auto level = [&] { return shortest(random.uniform(-2, 2)); };
@@ -324,7 +324,7 @@ TEST(EventsWithinBoundsOfStiffSteps, AreThoseThatAreFoundWithout) {
   for (const RunOptions& options : {RunOptions{.method = Method::radau, .stages = 3, .step = 0.1},
                                     RunOptions{.method = Method::radau, .stages = 2, .step = 0.01},
                                     RunOptions{.stages = 2, .step = 0.1}, RunOptions{.stages = 3, .step = 0.1}}) {
-    RunSetup setup{subject, Motion(0, one, 5 * one), options, 1};
+    RunSetup setup{{options, 1}, subject, Motion(0, one, 5 * one)};
     setup.doubted = false;
     setup.events =
         io::events_of({plan("a", "theta_dot_1 - 2"), plan("b", "theta_dot_1 - 4.9"), plan("c", "theta_dot_1 + 1")},
@@ -356,7 +356,7 @@ INSTANTIATE_TEST_SUITE_P(
 /// A motion whose steps are long.
 RunSetup slow_motion(const RunOptions& options, double duration) {
   const Eigen::VectorXd one = Eigen::VectorXd::Constant(1, 0.1);
-  return {std::make_shared<ChainSubject<Planar>>(equal_chain<Planar>(1)), Motion(0, one, one), options, duration};
+  return {{options, duration}, std::make_shared<ChainSubject<Planar>>(equal_chain<Planar>(1)), Motion(0, one, one)};
 }
 
 const std::vector<RunOptions> few_methods = {{.stages = 8, .step = 0, .tolerance = 1e-9},

@@ -16,11 +16,9 @@ namespace pendula::test {
 namespace {
 
 RunSetup double_pendulum(double duration) {
-  RunSetup setup{std::make_shared<ChainSubject<Planar>>(equal_chain<Planar>(2)),
-                 State<Planar>::from_angles(Eigen::Vector2d(1, 2)),
-                 {},
-                 duration,
-                 10};
+  RunSetup setup{{.duration = duration},
+                 std::make_shared<ChainSubject<Planar>>(equal_chain<Planar>(2)),
+                 State<Planar>::from_angles(Eigen::Vector2d(1, 2))};
   setup.options.stages = 8;
   setup.options.step = 0.01;
   return setup;

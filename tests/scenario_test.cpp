@@ -101,13 +101,13 @@ TEST(Scenario, DefaultsAreThoseOfTheReference) {
   EXPECT_EQ(scenario.start.q, numbers({0.5, -0.25}));
   EXPECT_EQ(scenario.start.v, numbers({0, 0}));
   EXPECT_EQ(scenario.start.time, 0);
-  EXPECT_EQ(scenario.run.method, Method::gauss);
-  EXPECT_EQ(scenario.run.stages, 8);
-  EXPECT_EQ(scenario.run.form, Form::momentum);
-  EXPECT_EQ(scenario.run.solver, Solver::automatic);
-  EXPECT_EQ(scenario.run.iteration, Iteration::automatic);
-  EXPECT_EQ(scenario.run.step, 0);
-  EXPECT_EQ(scenario.run.tolerance, 1e-9);
+  EXPECT_EQ(scenario.options.method, Method::gauss);
+  EXPECT_EQ(scenario.options.stages, 8);
+  EXPECT_EQ(scenario.options.form, Form::momentum);
+  EXPECT_EQ(scenario.options.solver, Solver::automatic);
+  EXPECT_EQ(scenario.options.iteration, Iteration::automatic);
+  EXPECT_EQ(scenario.options.step, 0);
+  EXPECT_EQ(scenario.options.tolerance, 1e-9);
   EXPECT_EQ(scenario.duration, 10);
   EXPECT_TRUE(scenario.rows.chosen);
   EXPECT_EQ(scenario.rows.interval, 0.01);
@@ -133,17 +133,17 @@ TEST(Scenario, EveryKeyIsRead) {
   EXPECT_EQ(scenario.start.phi(), numbers({0.25, 0.25, 0.25}));
   EXPECT_EQ(scenario.start.theta_dot(), numbers({1, 1, 1}));
   EXPECT_EQ(scenario.start.phi_dot(), numbers({1, 2, 3}));
-  EXPECT_EQ(scenario.run.stages, 4);
-  EXPECT_EQ(scenario.run.form, Form::velocity);
-  EXPECT_EQ(scenario.run.solver, Solver::dense);
-  EXPECT_EQ(scenario.run.iteration, Iteration::newton);
-  EXPECT_EQ(scenario.run.step, 1e-2);
+  EXPECT_EQ(scenario.options.stages, 4);
+  EXPECT_EQ(scenario.options.form, Form::velocity);
+  EXPECT_EQ(scenario.options.solver, Solver::dense);
+  EXPECT_EQ(scenario.options.iteration, Iteration::newton);
+  EXPECT_EQ(scenario.options.step, 1e-2);
   EXPECT_EQ(scenario.duration, 5);
   EXPECT_EQ(scenario.every, 3);
 }
 
 TEST(Scenario, NamesOfSettingsMeanTheirEnumerators) {
-  const auto run = [](const std::string& setting) { return parsed<Planar>(planar_text, {"run." + setting}).run; };
+  const auto run = [](const std::string& setting) { return parsed<Planar>(planar_text, {"run." + setting}).options; };
   EXPECT_EQ(run("method=rk4").method, Method::rk4);
   EXPECT_EQ(run("method=dopri5").method, Method::dopri5);
   EXPECT_EQ(run("method=fehlberg78").method, Method::fehlberg78);
@@ -170,10 +170,10 @@ TEST(Scenario, DefaultsAreThoseOfTheTableOfKeys) {
       EXPECT_EQ(with.natural.has_value(), without.natural.has_value()) << change;
       EXPECT_EQ(with.start.q, without.start.q) << change;
       EXPECT_EQ(with.start.v, without.start.v) << change;
-      EXPECT_EQ(with.run.method, without.run.method) << change;
-      EXPECT_EQ(with.run.form, without.run.form) << change;
-      EXPECT_EQ(with.run.solver, without.run.solver) << change;
-      EXPECT_EQ(with.run.iteration, without.run.iteration) << change;
+      EXPECT_EQ(with.options.method, without.options.method) << change;
+      EXPECT_EQ(with.options.form, without.options.form) << change;
+      EXPECT_EQ(with.options.solver, without.options.solver) << change;
+      EXPECT_EQ(with.options.iteration, without.options.iteration) << change;
       EXPECT_EQ(with.duration, without.duration) << change;
       EXPECT_EQ(with.estimate, without.estimate) << change;
       EXPECT_EQ(with.checkpoint, without.checkpoint) << change;
@@ -182,7 +182,7 @@ TEST(Scenario, DefaultsAreThoseOfTheTableOfKeys) {
   }
   EXPECT_EQ(tried, 14);
   EXPECT_EQ(without.chain.gravity(), ChainParameters<Planar>{}.gravity);
-  EXPECT_EQ(without.run.tolerance, std::get<double>(find_key("run.tolerance")->otherwise));
+  EXPECT_EQ(without.options.tolerance, std::get<double>(find_key("run.tolerance")->otherwise));
 }
 
 TEST(Scenario, KeysAreFoundByTheirNames) {
@@ -239,8 +239,8 @@ TEST(Scenario, OverridesReplaceWhatTheFileSays) {
   const auto scenario = parsed<Planar>(
       planar_text, {"run.step=1e-4", "run.method = rk4", "chain.masses=[3, 4]", "output.every=7", "start={theta=0.125}",
                     "chain.drive=[{link=1, amplitude=2, frequency=3}]", "run.step=2e-4"});
-  EXPECT_EQ(scenario.run.step, 2e-4);  // the last one counts
-  EXPECT_EQ(scenario.run.method, Method::rk4);
+  EXPECT_EQ(scenario.options.step, 2e-4);  // the last one counts
+  EXPECT_EQ(scenario.options.method, Method::rk4);
   EXPECT_EQ(scenario.chain.masses(), numbers({3, 4}));
   EXPECT_EQ(scenario.every, 7);
   EXPECT_EQ(scenario.start.theta(), numbers({0.125, 0.125}));

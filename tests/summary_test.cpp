@@ -48,8 +48,8 @@ Summary summary_of_a_run() {
   Summary summary;
   summary.model = model_summary("run.toml", chain, std::nullopt);
   summary.description = {"dense", "newton", "spatial_2"};
-  summary.duration = 10;
-  summary.every = 5;
+  summary.asked.duration = 10;
+  summary.asked.every = 5;
   summary.statistics = {1000, 2, 3000};
   summary.stepping_seconds = 0.25;
   summary.energy_error = {-1.5, 100, 1e-12};

@@ -43,11 +43,7 @@ RunOptions exact() {
 
 template <class Space>
 RunSetup setup_of(const Chain<Space>& chain, const Motion& start, const RunOptions& options, double duration) {
-  return {.subject = std::make_shared<ChainSubject<Space>>(chain),
-          .start = start,
-          .options = options,
-          .duration = duration,
-          .doubted = false};
+  return {{options, duration}, std::make_shared<ChainSubject<Space>>(chain), start, false};
 }
 
 RunReport run_of(RunSetup setup) {

@@ -110,7 +110,7 @@ void require_continuous(const io::RunPlan& plan) {
 std::shared_ptr<Prepared> prepared(io::AnyScenario any, bool remembers) {
   return std::visit(
       [&](const auto& scenario) {
-        const RunOptions& run = scenario.run;
+        const RunOptions& run = scenario.options;
         require_continuous(scenario);
         const SimulationOptions options{.method = run.method,
                                         .stages = scenario.places.contains("stages") ? run.stages : 0,

@@ -142,13 +142,13 @@ std::optional<double> step_of(const io::RunPlan& plan) {
   for (const io::FeedbackPlan& feedback : plan.feedback) {
     if (feedback.sample > 0) return feedback.sample;
   }
-  return plan.run.method == Method::gauss && plan.run.step > 0 ? std::optional(plan.run.step) : std::nullopt;
+  return plan.options.method == Method::gauss && plan.options.step > 0 ? std::optional(plan.options.step) : std::nullopt;
 }
 
 /// What the steps of an FMU err by: the tolerance that is asked for, or the accuracy.
 double tolerance_of(const io::RunPlan& plan) {
-  if (!is_adaptive(plan.run)) return RunOptions{}.tolerance;
-  return plan.accuracy.error > 0 ? plan.accuracy.error : plan.run.tolerance;
+  if (!is_adaptive(plan.options)) return RunOptions{}.tolerance;
+  return plan.accuracy.error > 0 ? plan.accuracy.error : plan.options.tolerance;
 }
 
 /// What the generator is told of the library that an FMU has in it.
@@ -194,8 +194,8 @@ Words scenario_words(const ExportOptions& options, io::Toolchain toolchain) {
         };
         if (std::ranges::any_of(found.columns, is_own)) std::cerr << "pendula: warning: columns are not exported\n";
         if (const std::optional<double> step = step_of(found)) add_number(words, "step", *step);
-        if (found.run.method == Method::gauss && found.run.step > 0 && !options.stages) {
-          add_number(words, "stages", found.run.stages);
+        if (found.options.method == Method::gauss && found.options.step > 0 && !options.stages) {
+          add_number(words, "stages", found.options.stages);
         }
         return words;
       },

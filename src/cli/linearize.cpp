@@ -95,7 +95,7 @@ Linear linear_of(const Scenario& scenario, const LinearizeOptions& options, cons
   linear.b.resize(n, static_cast<Eigen::Index>(linear.inputs.size()));
   if (!options.step.empty()) {
     linear.step = io::number_or_quantity(options.step, "s", {.time = scenario.natural ? scenario.natural->time : 1});
-    make_discrete(*subject, scenario.run, *linear.step, guard, linear);
+    make_discrete(*subject, scenario.options, *linear.step, guard, linear);
   } else {
     linearize(*subject, linear.at, linear.a.data(), linear.b.data());
   }

@@ -1,6 +1,5 @@
 #include <iomanip>
 #include <iostream>
-#include <limits>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -82,7 +81,7 @@ template <class Scenario>
 ExitStatus run(const Scenario& scenario, const LyapunovOptions& options) {
   const std::shared_ptr<const Subject> subject = io::subject_of(scenario);
   const InterruptGuard guard;
-  const std::unique_ptr<Integrator> integrator = subject->make_integrator(scenario.run);
+  const std::unique_ptr<Integrator> integrator = subject->make_integrator(scenario.options);
   const int all = 2 * static_cast<int>(scenario.start.q.size());
   integrator->linearize();
   if (const auto accuracy = scenario.places.find("accuracy"); accuracy != scenario.places.end()) {
@@ -94,8 +93,7 @@ ExitStatus run(const Scenario& scenario, const LyapunovOptions& options) {
   const auto on_way = [&](const LyapunovProgress& progress) {
     if (history) history->add(progress);
   };
-  const double largest_step = is_adaptive(scenario.run) ? std::numeric_limits<double>::infinity() : scenario.run.step;
-  const LyapunovRun found = find_lyapunov_spectrum(*integrator, scenario.start, largest_step, scenario.duration,
+  const LyapunovRun found = find_lyapunov_spectrum(*integrator, scenario.start, longest_step(scenario.options), scenario.duration,
                                                    options.count, on_way, [&] { return guard.interrupted(); });
   if (history) history->close();
   if (options.json) {

@@ -138,15 +138,12 @@ std::optional<Motion> MotionCheck::end(const RunOptions& options, int steps, con
 
 /// The end by adaptive steps, which notice what acts for less than a step.
 std::optional<Motion> MotionCheck::own_steps(double time) const {
-  RunSetup setup;
-  setup.subject = {std::shared_ptr<void>(), &subject_};
-  setup.start = start_;
-  setup.options = options(8, Form::momentum);
+  RunSetup setup{{options(8, Form::momentum), time, std::numeric_limits<std::int64_t>::max()},
+                 {std::shared_ptr<void>(), &subject_},
+                 start_,
+                 false};
   setup.options.step = 0;
   setup.options.tolerance = 1e-10;
-  setup.duration = time;
-  setup.every = std::numeric_limits<std::int64_t>::max();
-  setup.doubted = false;
   const RunReport report = Run(setup).go();
   return report.end == RunEnd::complete ? std::optional(report.last) : std::nullopt;
 }
@@ -320,13 +317,8 @@ CheckLine MotionCheck::event(const Span& span) const {
   Eigen::Index fastest = 0;
   const double speed = (there->motion.v.array() / span.v.array()).abs().maxCoeff(&fastest);
   if (speed < 1e-6) return at_most(what, 0);  // nothing moves
-  RunSetup setup;
-  setup.subject = {std::shared_ptr<void>(), &subject_};
-  setup.start = start_;
-  setup.options = options(6, Form::momentum);
+  RunSetup setup{{options(6, Form::momentum), duration}, {std::shared_ptr<void>(), &subject_}, start_, false};
   setup.options.step = duration / 4;
-  setup.duration = duration;
-  setup.doubted = false;
   setup.events = {{"there", [&](const Motion& motion) { return motion.q[fastest] - there->motion.q[fastest]; }}};
   const RunReport report = Run(setup).go();
   const EventTally& tally = report.events.front();

@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <cstddef>
 #include <functional>
-#include <limits>
 #include <memory>
 #include <pendula/run/integrator.hpp>
 #include <pendula/system/options.hpp>
@@ -39,11 +38,10 @@ extern "C" pendula_status pendula_lyapunov(const pendula_tangents* tangents, dou
     const RunOptions options = options_of(tangents->options);
     const Motion start = motion_of(model, tangents->time, tangents->q, tangents->v);
     const std::unique_ptr<Integrator> integrator = model.subject->make_integrator(options);
-    const double step = is_adaptive(options) ? std::numeric_limits<double>::infinity() : options.step;
     std::function<bool()> stop = [] { return false; };
     if (tangents->stop != nullptr) stop = [tangents] { return tangents->stop(tangents->context) != 0; };
     const LyapunovRun found = find_lyapunov_spectrum(
-        *integrator, start, step, tangents->duration, static_cast<int>(tangents->count), [](const LyapunovProgress&) {},
+        *integrator, start, longest_step(options), tangents->duration, static_cast<int>(tangents->count), [](const LyapunovProgress&) {},
         stop);
     require(found.result.outcome, *model.subject);
     std::ranges::copy(found.exponents, exponents);

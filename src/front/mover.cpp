@@ -109,7 +109,7 @@ Advance Mover::advance_to(double time) {
   require_rest("advance");
   const Raised advancing(is_advancing_);
   Schedule schedule;
-  schedule.step = is_adaptive(options_) ? std::numeric_limits<double>::infinity() : options_.step;
+  schedule.step = longest_step(options_);
   schedule.duration = time - origin_;
   schedule.every = std::numeric_limits<std::int64_t>::max();
   stopping_.reset();

@@ -18,19 +18,21 @@
 namespace pendula::front {
 namespace {
 
-std::vector<EnsembleMember> members_of(const pendula_ensemble& ensemble) {
+std::vector<RunSetup> members_of(const pendula_ensemble& ensemble) {
   const std::span models(ensemble.models, ensemble.model_count);
   if (models.size() != 1 && models.size() != ensemble.members) {
     throw std::invalid_argument("models: expected one, or one for each of " + std::to_string(ensemble.members) +
                                 " members, got " + std::to_string(models.size()));
   }
   const std::size_t coordinates = models[0]->coordinates;
-  std::vector<EnsembleMember> members;
+  const RunRequest asked{.options = options_of(ensemble.options), .duration = ensemble.duration, .every = 1};
+  std::vector<RunSetup> members;
   for (std::size_t k = 0; k < ensemble.members; ++k) {
     const pendula_model& model = *models[models.size() == 1 ? 0 : k];
     if (model.coordinates != coordinates) throw std::invalid_argument("models: expected as many coordinates of each");
     const double* start = ensemble.starts + k * 2 * coordinates;
-    members.push_back({model.subject, motion_of(model, ensemble.time, start, start + coordinates)});
+    members.push_back({asked, model.subject, motion_of(model, ensemble.time, start, start + coordinates)});
+    members.back().doubted = false;
   }
   return members;
 }
@@ -46,28 +48,23 @@ extern "C" pendula_status pendula_propagate(const pendula_ensemble* ensemble, do
                                             double* energy_errors) {
   return guarded([&] {
     if (ensemble->members == 0) return PENDULA_OK;
-    const std::vector<EnsembleMember> members = members_of(*ensemble);
     if (!(ensemble->duration >= 0) || std::isinf(ensemble->duration)) {
       throw std::invalid_argument("duration: expected a number, not negative, got " +
                                   std::to_string(ensemble->duration));
     }
+    const std::vector<RunSetup> members = members_of(*ensemble);
     const std::size_t coordinates = ensemble->models[0]->coordinates;
-    EnsembleSchedule schedule;
-    schedule.options = options_of(ensemble->options);
-    schedule.duration = ensemble->duration;
-    schedule.threads =
+    const int threads =
         ensemble->threads > 0 ? ensemble->threads : static_cast<int>(std::thread::hardware_concurrency());
-    schedule.threads = std::max(schedule.threads, 1);
-    if (ensemble->stop != nullptr) {
-      schedule.stop = [stop = ensemble->stop, context = ensemble->context] { return stop(context) != 0; };
-    }
-    propagate(members, schedule, [&](std::size_t number, const RunReport& report) {
+    const auto stop = [ensemble] { return ensemble->stop != nullptr && ensemble->stop(ensemble->context) != 0; };
+    const auto observe = [&](std::size_t number, const RunReport& report) {
       const Motion& last = report.last.q.size() > 0 ? report.last : members[number].start;
       write(last, ends + number * 2 * coordinates, ends + (number * 2 + 1) * coordinates);
       if (how != nullptr) how[number] = status_of(report.end);
       if (energy_errors != nullptr) energy_errors[number] = report.energy_error.largest;
-    });
-    return ensemble->stop != nullptr && schedule.stop() ? PENDULA_STOPPED : PENDULA_OK;
+    };
+    propagate(members, std::max(threads, 1), observe, stop);
+    return stop() ? PENDULA_STOPPED : PENDULA_OK;
   });
 }
 

@@ -80,7 +80,7 @@ std::vector<std::string> EnsembleJob::warnings(const EnsembleTally& tally) const
     const std::int64_t first = tally.first_untrusted;
     std::string numbers;
     for (const std::string& each : head_.plan.overrides(first)) numbers += (numbers.empty() ? "" : ", ") + each;
-    const auto advice = [](const auto& scenario) { return detail::smaller_step_advice(scenario.run); };
+    const auto advice = [](const auto& scenario) { return detail::smaller_step_advice(scenario.options); };
     warnings.push_back("of " + std::to_string(tally.looked_at) + " members that were looked at again " +
                        std::to_string(tally.untrusted) +
                        " cannot be trusted, or not to the last digits (trusted = 0 in the file); the first, member " +

@@ -78,16 +78,13 @@ MemberScenario::MemberScenario(AnyScenario read)
       start(std::visit([](const auto& of) -> Motion { return of.start; }, *scenario)) {}
 
 RunSetup MemberScenario::setup() const {
-  const RunPlan& asked = plan();
-  return {.subject = subject,
-          .start = start,
-          .options = asked.run,
-          .duration = asked.duration,
-          .every = asked.rows.chosen && !is_adaptive(asked.run) ? 10 : asked.every,  // looks at the energy
-          .accuracy = asked.places.contains("accuracy") ? asked.accuracy : Accuracy{},
-          .doubted = false,
-          .estimate = asked.estimate,
-          .chooses_method = asked.chooses_method};
+  RunSetup setup{plan(), subject, start};
+  if (setup.rows.chosen && !is_adaptive(setup.options)) setup.every = 10;  // steps from one look at the energy to the next
+  setup.rows = {};
+  if (!plan().places.contains("accuracy")) setup.accuracy = {};
+  setup.checkpoint = std::numeric_limits<double>::infinity();
+  setup.doubted = false;
+  return setup;
 }
 
 MemberScenarios::MemberScenarios(ScenarioText text, std::vector<std::string> overrides, Toolchain toolchain, Tell tell)
@@ -306,11 +303,10 @@ std::string MemberRuns::append(const Member& member, std::vector<double>& rows) 
 
 LyapunovSpectrum MemberRuns::leading_exponent(const MemberScenario& scenario) const {
   const RunPlan& plan = scenario.plan();
-  const double step = is_adaptive(plan.run) ? std::numeric_limits<double>::infinity() : plan.run.step;
   LyapunovRun found = told_at_keys(plan, scenarios_.text().name, [&] {
-    const auto integrator = scenario.subject->make_integrator(plan.run);
+    const auto integrator = scenario.subject->make_integrator(plan.options);
     return find_lyapunov_spectrum(
-        *integrator, scenario.start, step, plan.duration, 1, [](const LyapunovProgress&) {}, stop_);
+        *integrator, scenario.start, longest_step(plan.options), plan.duration, 1, [](const LyapunovProgress&) {}, stop_);
   });
   if (found.result.stopped) throw Interrupted();
   return found;

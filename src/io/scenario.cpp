@@ -320,24 +320,24 @@ double usual_interval(double duration) {
 void choose_rows(RunPlan& plan) {
   plan.rows.chosen = true;
   const double interval = usual_interval(plan.duration);
-  if (is_adaptive(plan.run)) {
+  if (is_adaptive(plan.options)) {
     plan.rows.interval = interval;
   } else {
-    plan.every = static_cast<std::int64_t>(std::max(1.0, std::floor(interval / plan.run.step * (1 + 1e-9))));
+    plan.every = static_cast<std::int64_t>(std::max(1.0, std::floor(interval / plan.options.step * (1 + 1e-9))));
   }
 }
 
 /// Reads [run] and [output].
 void read_plan(const RunSections& sections, RunPlan& plan) {
-  plan.run = read_run(sections.run);
+  plan.options = read_run(sections.run);
   plan.chooses_method = chooses_method(sections.run);
-  plan.accuracy = read_accuracy(sections.run, plan.run);
-  plan.duration = read_duration(sections.run, plan.run);
+  plan.accuracy = read_accuracy(sections.run, plan.options);
+  plan.duration = read_duration(sections.run, plan.options);
   plan.estimate = sections.run.truth("estimate");
-  const std::vector<std::string> unused = unused_keys(sections.run, plan.run);
+  const std::vector<std::string> unused = unused_keys(sections.run, plan.options);
   plan.warnings.insert(plan.warnings.end(), unused.begin(), unused.end());
   const auto every = sections.output.find("every");
-  if (every) plan.every = every->integer();
+  plan.every = every ? every->integer() : 1;
   plan.rows = read_row_times(sections.output, plan.duration);
   if (!every && !plan.rows.any()) choose_rows(plan);
   if (every && plan.rows.any()) plan.warnings.push_back(every->place() + ": has no effect where rows are at times");

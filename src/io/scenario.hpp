@@ -1,6 +1,5 @@
 #pragma once
 
-#include <cstdint>
 #include <filesystem>
 #include <functional>
 #include <map>
@@ -8,11 +7,9 @@
 #include <optional>
 #include <pendula/chain/chain.hpp>
 #include <pendula/chain/state.hpp>
-#include <pendula/run/accuracy.hpp>
-#include <pendula/run/row_times.hpp>
+#include <pendula/run/run_report.hpp>
 #include <pendula/run/system_subject.hpp>
 #include <pendula/system/motion.hpp>
-#include <pendula/system/options.hpp>
 #include <pendula/system/system_table.hpp>
 #include <span>
 #include <string>
@@ -36,19 +33,11 @@ namespace pendula::io {
 inline constexpr double max_steps = 9e15;
 
 /// What a scenario says about a run, checked.
-struct RunPlan {
-  RunOptions run;
-  bool chooses_method = false;  ///< Taylor series may take the place of Gauss steps
-  Accuracy accuracy;
-  bool estimate = true;  ///< whether to estimate how far the rows can be trusted
-  double duration = 0;
-  std::int64_t every = 1;  ///< steps from row to row
+struct RunPlan : RunRequest {
   std::vector<EventPlan> events;
   std::vector<FeedbackPlan> feedback;
   std::vector<SignalPlan> signals;
   std::vector<ColumnPlan> columns;      ///< of rows, besides those of the motion
-  RowTimes rows;                        ///< if there are any, in place of `every`
-  double checkpoint = 0;                ///< of wall time from one checkpoint to the next  [s]
   std::optional<NaturalUnits> natural;  ///< units of all numbers of the scenario; empty for SI
   std::vector<std::string> warnings;    ///< one sentence each
   /// Where keys stand, as `where: key`, for later errors: the keys of [run] by name, and by "links" what tells the

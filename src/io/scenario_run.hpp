@@ -40,17 +40,9 @@ inline std::shared_ptr<const Subject> subject_of(const SystemScenario& scenario)
 template <class ScenarioType>
 RunSetup setup_of(const ScenarioType& scenario) {
   const std::shared_ptr<const Subject> subject = subject_of(scenario);
-  return {.subject = subject,
-          .start = scenario.start,
-          .options = scenario.run,
-          .duration = scenario.duration,
-          .every = scenario.every,
-          .rows = scenario.rows,
-          .accuracy = scenario.accuracy,
-          .estimate = scenario.estimate,
-          .checkpoint = scenario.checkpoint,
-          .events = events_of(scenario.events, subject, scenario.start),
-          .chooses_method = scenario.chooses_method};
+  RunSetup setup{scenario, subject, scenario.start};
+  setup.events = events_of(scenario.events, subject, scenario.start);
+  return setup;
 }
 
 /// The names of the events that a run looks for.
@@ -84,10 +76,7 @@ auto told_at_keys(const RunPlan& plan, const std::string& file, Do act) {
 
 /// Adds to a summary, which has the report of a run, what was asked for and how the run ended.
 inline void describe(const RunSetup& setup, Summary& summary) {
-  summary.accuracy = setup.accuracy.error;
-  summary.duration = setup.duration;
-  summary.every = setup.every;
-  summary.at = setup.rows;
+  summary.asked = setup;
   summary.event_names = event_names(setup);
   summary.ending = ending_of(summary, setup.subject->coordinates(), summary.event_names, setup.subject->switches());
 }

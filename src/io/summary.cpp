@@ -41,9 +41,9 @@ std::string plural(std::int64_t count, const std::string& noun) {
 }
 
 std::string rows_text(const Summary& summary, const std::string& unit) {
-  if (summary.at.interval > 0) return "a row every " + shortest(summary.at.interval) + unit;
-  if (summary.at.any()) return "rows at " + plural(static_cast<std::int64_t>(summary.at.times.size()), "time");
-  return "a row every " + plural(summary.every, "step");
+  if (summary.asked.rows.interval > 0) return "a row every " + shortest(summary.asked.rows.interval) + unit;
+  if (summary.asked.rows.any()) return "rows at " + plural(static_cast<std::int64_t>(summary.asked.rows.times.size()), "time");
+  return "a row every " + plural(summary.asked.every, "step");
 }
 
 std::string shown_or_dash(double value, int digits) {
@@ -99,14 +99,14 @@ std::string settings(const Summary& summary) {
   if (!description.kernel.empty() && summary.kernel_by == "llvm") solver += ", by LLVM";
   if (!solver.empty()) text += line("solver", solver);
   const std::string time(unit.time);
-  if (summary.aimed) text += line("accuracy", shortest(summary.accuracy));
+  if (summary.aimed) text += line("accuracy", shortest(summary.asked.accuracy.error));
   std::string tolerance = summary.aimed ? rounded(summary.options.tolerance, 3) : shortest(summary.options.tolerance);
   if (summary.motion_tolerance > 0 && !summary.aimed) {
     tolerance = shortest(summary.motion_tolerance) + ", by one of a step of " + rounded(summary.options.tolerance, 1);
   }
   text +=
       is_adaptive(summary.options) ? line("tolerance", tolerance) : line("step", shortest(summary.options.step) + time);
-  text += line("duration", shortest(summary.duration) + time + ", " + rows_text(summary, time));
+  text += line("duration", shortest(summary.asked.duration) + time + ", " + rows_text(summary, time));
   if (model.natural) {
     text += line("units", "l_1 = " + rounded(model.natural->length) + " m, M_1 = " + rounded(model.natural->mass) +
                               " kg, sqrt(l_1/g) = " + rounded(model.natural->time) + " s");
@@ -215,7 +215,7 @@ std::string end_of_run(const Summary& summary) {
   std::string text = place(summary) + events_text(summary);
   if (summary.event_file) text += line("events", *summary.event_file);
   if (!summary.ending.event.empty()) {
-    text += line("stopped by", "event " + summary.ending.event + ", before the end at " + shortest(summary.duration) +
+    text += line("stopped by", "event " + summary.ending.event + ", before the end at " + shortest(summary.asked.duration) +
                                    std::string(unit_names(summary.model.natural).time));
   }
   if (summary.trajectory) text += line("trajectory", *summary.trajectory + ", " + plural(summary.rows_written, "row"));

@@ -66,11 +66,8 @@ struct Ending {
 /// The summary of a run. Its text has no warnings, since those were printed as they came.
 struct Summary : RunReport {
   ModelSummary model;
-  double accuracy = 0;  ///< as asked for
-  double duration = 0;  ///< as asked for
-  std::int64_t every = 0;
+  RunRequest asked;
   std::string kernel_by = "build";  ///< ModelKernel::by, where there is a kernel
-  RowTimes at;                      ///< times of rows, if they are given
   Ending ending;
   std::vector<std::string> shown;         ///< columns of the table that is shown
   Snapshot final;                         ///< the last state reached, of a chain

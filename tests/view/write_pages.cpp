@@ -59,7 +59,7 @@ class Pages {
     io::TrajectoryFile trajectory(folder_ / (plan.name + ".csv"), subject->columns());
     for (std::size_t k = 0; k < starts.size(); ++k) {
       page.begin_run(k == 0 ? "first" : "copy " + std::to_string(k));
-      RunSetup setup{subject, starts[k], plan.options, plan.duration, plan.every};
+      RunSetup setup{{plan.options, plan.duration, plan.every}, subject, starts[k]};
       setup.events = plan.events;
       run(setup, plan.name, page, k == 0 ? &trajectory : nullptr);
     }

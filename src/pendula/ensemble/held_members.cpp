@@ -82,8 +82,9 @@ HeldMembers::HeldMembers(std::shared_ptr<const Subject> subject, std::size_t coo
   subject_->make_integrator(options_);  // throws here, not at the first move
   const auto size = static_cast<Eigen::Index>(coordinates_);
   // A held input may be a load, which lanes for chains without loads do not take.
-  const RunSetup setup{with_inputs(subject_, std::vector<double>(inputs_, 1)),
-                       Motion(0, Eigen::VectorXd::Zero(size), Eigen::VectorXd::Zero(size)), options_, duration_};
+  const RunSetup setup{{options_, duration_},
+                       with_inputs(subject_, std::vector<double>(inputs_, 1)),
+                       Motion(0, Eigen::VectorXd::Zero(size), Eigen::VectorXd::Zero(size))};
   in_lanes_ = quickest_in_lanes(setup);
   kind_ = lane_kind(setup, in_lanes_);
 }
@@ -145,7 +146,6 @@ Outcome HeldMembers::go_alone(Numbers inputs, Numbers state, const MemberEnd& en
   const Eigen::Map<const Eigen::VectorXd> q(state.data(), size), v(state.data() + size, size);
   const std::unique_ptr<Integrator> integrator = with_inputs(subject_, inputs)->make_integrator(options_);
   Outcome outcome = integrator->start(Motion(0, q, v));
-  const double step = is_adaptive(options_) ? duration_ : options_.step;
   while (outcome && integrator->time() < duration_) {
     const double left = duration_ - integrator->time();
     outcome = integrator->step(detail::ends_before(step, left) ? step : left);

@@ -1,5 +1,4 @@
 #include <cstddef>
-#include <limits>
 #include <memory>
 #include <pendula/chain/chain_variation.hpp>
 #include <pendula/explicit/chain_forward_dynamics.hpp>
@@ -33,10 +32,6 @@ class Differentiated {
  public:
   explicit Differentiated(const MotionTask& task)
       : task_(task), integrator_(task.subject.make_integrator(task.options)), rows_(integrator_->linearize()) {
-    if (is_adaptive(task.options))
-      step_ = std::numeric_limits<double>::infinity();
-    else
-      step_ = task.options.step;
     double before = task.start.time;
     for (const double time : task.times) {
       if (!(time >= before) || std::isinf(time)) {
@@ -66,7 +61,7 @@ class Differentiated {
     double from = task_.start.time;
     for (const double time : task_.times) {
       Schedule schedule;
-      schedule.step = step_;
+      schedule.step = longest_step(task_.options);
       schedule.duration = time - from;
       const double began = integrator_->time();
       while (moved.outcome && !detail::at_end(schedule, integrator_->time() - began)) {
@@ -100,7 +95,6 @@ class Differentiated {
   const MotionTask& task_;
   std::unique_ptr<Integrator> integrator_;
   Eigen::Index rows_;
-  double step_;
 };
 
 void require_rows(const char* what, const Directions<>& got, Eigen::Index rows, Eigen::Index columns) {

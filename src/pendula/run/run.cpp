@@ -202,8 +202,7 @@ void Run::conclude(RunReport& report) {
 
 void Run::integrate(const Checkpoint* from, const std::function<bool()>& stop, RunReport& report) {
   const RunOptions& options = setup_.options;
-  const double largest_step = is_adaptive(options) ? std::numeric_limits<double>::infinity() : options.step;
-  const Schedule schedule{largest_step, setup_.duration, setup_.every, setup_.rows};
+  const Schedule schedule{longest_step(options), setup_.duration, setup_.every, setup_.rows};
   const auto on_row = [&](const Motion& motion, double work = 0) { take(motion, work); };
   const auto on_way = [&](const RowPlace& place, bool last) { come_by(place, last); };
   const auto on_step = [&] {

@@ -19,22 +19,25 @@
 
 namespace pendula {
 
-/// What to run, from where, and how.
-struct RunSetup {
-  std::shared_ptr<const Subject> subject;
-  Motion start;
-  RunOptions options;
+/// What is asked of a run, whatever it moves.
+struct RunRequest {
+  RunOptions options = {};
   double duration = 10;     ///< s
   std::int64_t every = 10;  ///< steps from row to row; the first and the last state are always rows
   RowTimes rows = {};       ///< if any: rows at these times instead of `every`
   Accuracy accuracy = {};   ///< if given, the tolerance is found from it by trials
-  bool doubted = true;      ///< whether to look for reasons to doubt the result
   bool estimate = true;     ///< whether to run a second time to estimate the error, if doubted
   double checkpoint = std::numeric_limits<double>::infinity();  ///< wall time between checkpoints  [s]
-  /// Events to find.
-  std::vector<Event> events = {};  // NOLINT(readability-redundant-member-init): left out in designated initializers
-  bool chooses_method = false;     ///< whether Taylor series take the place of Gauss steps that take longer
-  double motion_tolerance = 0;     ///< that series were chosen for: that of `options` is one of a step then
+  bool chooses_method = false;  ///< whether Taylor series take the place of Gauss steps that take longer
+};
+
+/// What to run, from where, and how.
+struct RunSetup : RunRequest {
+  std::shared_ptr<const Subject> subject;
+  Motion start;
+  bool doubted = true;              ///< whether to look for reasons to doubt the result
+  std::vector<Event> events = {};   ///< to find
+  double motion_tolerance = 0;      ///< that series were chosen for: that of `options` is one of a step then
 };
 
 /// How far a run can be trusted, found by comparison with another run.

@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cstddef>
+#include <limits>
 #include <optional>
 #include <ostream>
 #include <string_view>
@@ -87,6 +88,11 @@ inline constexpr double smallest_tolerance = 1e-16;
 /// Whether step sizes follow from the tolerance.
 constexpr bool is_adaptive(const RunOptions& options) {
   return is_adaptive(options.method) || (!is_explicit(options.method) && options.step == 0);
+}
+
+/// The longest step that may be asked for  [s]; infinite where the tolerance limits them.
+constexpr double longest_step(const RunOptions& options) {
+  return is_adaptive(options) ? std::numeric_limits<double>::infinity() : options.step;
 }
 
 /// The number of stages that takes the least time for a tolerance. Six take 0.95 to 1.8 times what eight take from 1e-5
