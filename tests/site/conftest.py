@@ -3,7 +3,6 @@
 import os
 import subprocess
 import sys
-import time
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -18,7 +17,6 @@ def site(tmp_path_factory) -> Path:
     """As scripts/docs builds it: any warning is an error."""
     folder = tmp_path_factory.mktemp("site")
     command = [sys.executable, "-m", "sphinx", "--fail-on-warning", "--keep-going", "--quiet", "--jobs", "2"]
-    began = time.monotonic()
     done = subprocess.run(
         [*command, "-d", folder / "doctrees", ROOT / "docs", folder / "html"],
         stdout=subprocess.PIPE,
@@ -26,7 +24,6 @@ def site(tmp_path_factory) -> Path:
         text=True,
     )
     assert done.returncode == 0, done.stdout
-    assert time.monotonic() - began < 240  # s; measured 57, and 110 on a busy machine
     return folder / "html"
 
 
