@@ -85,11 +85,14 @@ struct StepDecay {
     };
     const Num last = log_root(at(stages - 1));
     Num error = extended(last, stages - 1);
-    // With so few stages all rests on one coefficient, which vanishes where loads balance gravity.
-    if (stages == 2) return any(beyond > Num(0.0)) ? max(error, extended(log_root(beyond), stages)) : error;
     const Num next = log_root(at(stages - 2));
-    error = max(error, extended(next, stages - 2));
-    if (stages == 3) return error;
+    if (stages > 2) error = max(error, extended(next, stages - 2));
+    if (stages <= 3) {
+      // Too few to show how what is damped decays beside a motion that is not; and with two all rests on one
+      // coefficient, which vanishes where loads balance gravity.
+      const Num unseen = log_root(beyond), ratio = min(Num(0.0), unseen - last);
+      return select(unseen > noise, max(error, fma(ratio, Num(double(order - stages)), unseen)), error);
+    }
     const Num later = max(at(stages - 1), Num(detail::almost_zero)) + max(at(stages - 2), Num(detail::almost_zero));
     const Num before = max(at(stages - 3), Num(detail::almost_zero)) + at(stages - 4);
     const Num ratio = min(Num(0.0), Num(0.25) * log(later / before));  // from degree to degree

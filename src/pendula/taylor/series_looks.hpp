@@ -1,0 +1,193 @@
+#pragma once
+
+#include <algorithm>
+#include <cstddef>
+#include <pendula/explicit/error_size.hpp>
+#include <pendula/numeric/numeric.hpp>
+#include <pendula/numeric/pack_rows.hpp>
+#include <pendula/numeric/width.hpp>
+#include <pendula/system/field_look.hpp>
+#include <pendula/system/member_systems.hpp>
+#include <pendula/system/system_table.hpp>
+#include <pendula/taylor/series_expansion.hpp>
+#include <pendula/taylor/series_reach.hpp>
+#include <span>
+
+namespace pendula {
+
+/// Holds the steps of a Taylor series against the equations: its terms know nothing of what is ahead and vanishes with
+/// all its derivatives where the step begins, as a hill of a high power does.
+template <class Num>
+class SeriesLooks {
+ public:
+  using L = Num;
+  using Mask = MaskOf<L>;
+  using Series = SeriesExpansion<L>;
+
+  /// `systems` must outlive this object.
+  SeriesLooks(MemberSystems<L>& systems, const Series& series, double tolerance)
+      : systems_(systems),
+        look_(most_looks, 2, systems.info().argument_is_base),
+        largest_defect_(0.25 * series.order() * series.order() * std::max(tolerance, 1e-15)),
+        moved_(series.row()),
+        turned_(series.row()),
+        bent_(series.row()),
+        seen_(2 * series.coordinates()),
+        found_(series.coordinates()),
+        arguments_(3 * systems.info().argument_is_base.size() + 1) {}
+
+  /// A step that is tried: what it goes by, where it begins, and the series that has begun at its end.
+  struct Step {
+    const Series& series;
+    const SeriesReach<L>& reach;
+    const Series& ahead;
+    L time, size;  // s
+  };
+
+  /// Which of these members solve the equations on the way. `rises_at_end` are Series::rises of all coordinates there.
+  Mask hold(const Step& step, const PackRows<width_of<L>>& rises_at_end, const Mask& wanted) {
+    const std::size_t n = step.series.coordinates();
+    const L tau = step.size / step.series.unit();
+    for (std::size_t i = 0; i < n; ++i) to_row(step.ahead.acceleration(i), found_[i]);
+    Mask held = wanted & bends_so(step, tau);
+    if (!look_.has_to_look() || !any(held)) return held;
+    see(step.series, tau, rises_at_end);
+    find_arguments(step.time + step.size, 2);
+    const Mask is_far = held & goes_far(step);
+    for (int k = 1; k < looks && any(held & is_far); ++k) {
+      held = held & (solves(step, L(static_cast<double>(k) / looks)) | !is_far);
+    }
+    see(step.series, L(0.5) * tau);
+    find_arguments(fma(L(0.5), step.size, step.time), 1);
+    for (std::size_t i = 0; i < n; ++i) {
+      to_row(step.series.coefficient(0, i), seen_[i]);
+      to_row(step.series.velocity(i), seen_[n + i]);
+    }
+    find_arguments(step.time, 0);
+    const Mask is_doubtful = held & arguments_change();
+    return any(is_doubtful) ? held & solves_closely(step, is_doubtful) : held;
+  }
+
+ private:
+  static constexpr std::size_t W = width_of<L>;
+  // Places of a step that goes far where accelerations are compared, the end among them, as in every step; and how
+  // closely functions that may be narrow are looked at, in nodes of a Gauss method.
+  static constexpr int looks = 3, most_looks = 8;
+  static constexpr double far_turn = 0.5, far_way = 0.25;  // rad; of the largest length
+
+  /// In which members the step is so long that it may have gone over something that its end is not beside.
+  Mask goes_far(const Step& step) const {
+    L turn(0.0), way(0.0), size(0.0);
+    for (std::size_t i = 0; i < step.series.coordinates(); ++i) {
+      const L from = step.series.coefficient(0, i), to = step.ahead.coefficient(0, i), moved = abs(to - from);
+      if (systems_.info().is_angle[i]) {
+        turn = max(turn, moved);
+      } else {
+        way = max(way, moved);
+        size = max(size, max(abs(from), abs(to)));
+      }
+    }
+    return (turn > L(far_turn)) | (way > L(far_way) * size);
+  }
+
+  /// Finds the motion of the series at a time.
+  void see(const Series& series, const L& tau) {
+    series.sum_all(tau, Series::rises, moved_);
+    see(series, tau, moved_);
+  }
+  void see(const Series& series, const L& tau, const PackRows<W>& rises) {
+    const std::size_t n = series.coordinates();
+    const L inverse = L(1.0) / series.unit();
+    if (series.has_momenta()) series.sum_all(tau, Series::slopes, turned_);
+    for (std::size_t i = 0; i < n; ++i) {
+      to_row(fma(tau, from_row<L>(rises[i]), series.coefficient(0, i)), seen_[i]);
+      to_row(series.has_momenta() ? from_row<L>(turned_[i]) * inverse
+                                  : fma(tau, from_row<L>(rises[n + i]), series.coefficient(0, n + i)),
+             seen_[n + i]);
+    }
+  }
+
+  /// Whether accelerations at a fraction of the step are those of the series.
+  Mask solves(const Step& step, const L& share) {
+    const L tau = share * step.size / step.series.unit();
+    see(step.series, tau);
+    systems_.here(fma(share, step.size, step.time), &SystemFunctions::acceleration, seen_[0],
+                  seen_[step.series.coordinates()], found_[0]);
+    return bends_so(step, tau);
+  }
+
+  /// Whether the series bends by the accelerations that were found, but for what terms beyond its order may add, and
+  /// for the rounding of coordinates: where a motion dies away far from 0, nothing else is left.
+  Mask bends_so(const Step& step, const L& tau) {
+    const Series& series = step.series;
+    const std::size_t n = series.coordinates();
+    const L inverse = L(1.0) / series.unit();
+    series.has_momenta() ? series.sum_all(tau, Series::bends, bent_) : series.sum_all(tau, Series::slopes, turned_);
+    L farthest(0.0);
+    for (std::size_t i = 0; i < n; ++i) farthest = max(farthest, abs(series.coefficient(0, i)));
+    Mask held(L(0.0) == L(0.0));
+    for (std::size_t i = 0; i < n; ++i) {
+      const L by_series =
+          series.has_momenta() ? from_row<L>(bent_[i]) * (inverse * inverse) : from_row<L>(turned_[n + i]) * inverse;
+      const L off = step.size * series.unit() * abs(from_row<L>(found_[i]) - by_series);
+      const L defect = max(off - L(ErrorSize::rounding) * farthest, L(0.0));
+      held = held & (defect * step.reach.rate_scale(i) <= L(largest_defect_));
+    }
+    return held;
+  }
+
+  /// Arguments of functions that may be narrow, at the motion that was seen: where the step begins (look 0), in its
+  /// middle, and at its end.
+  void find_arguments(const L& time, int look) {
+    systems_.here(time, &SystemFunctions::call_arguments, seen_[0], seen_[seen_.rows() / 2], argument(look, 0));
+  }
+  double* argument(int look, std::size_t a) {
+    return arguments_[static_cast<std::size_t>(look) * systems_.info().argument_is_base.size() + a];
+  }
+
+  /// Whether one of them changes much from look to look.
+  Mask arguments_change() {
+    const std::span<const bool> is_base = systems_.info().argument_is_base;
+    Mask are_steady(L(0.0) == L(0.0));
+    for (int look = 1; look < 3; ++look) {
+      for (std::size_t a = 0; a < is_base.size(); ++a) {
+        const L here = from_row<L>(argument(look, a)), before = from_row<L>(argument(look - 1, a));
+        const L size = is_base[a] ? min(abs(here), abs(before)) : L(1.0);
+        are_steady = are_steady & (abs(here - before) <= L(FieldLook::much) * size);
+      }
+    }
+    return !are_steady;
+  }
+
+  /// Which of these members solve the equations wherever such functions change fast within the step; others do.
+  Mask solves_closely(const Step& step, const Mask& which) {
+    const L asked = select(which, L(1.0), L(0.0));
+    L wrong(0.0);
+    for (int lane = 0; lane < static_cast<int>(W); ++lane) {
+      if (get(asked, lane) != 0 && !solves_closely(step, lane)) set(wrong, lane, 1);
+    }
+    return wrong == L(0.0);
+  }
+  bool solves_closely(const Step& step, int lane) {
+    const auto arguments = [&](std::span<const double> shares, double* found) {
+      for (const double share : shares) {
+        see(step.series, L(share) * step.size / step.series.unit());
+        find_arguments(fma(L(share), step.size, step.time), 0);
+        for (std::size_t a = 0; a < systems_.info().argument_is_base.size(); ++a) *found++ = argument(0, a)[lane];
+      }
+    };
+    return !look_.finds(arguments) || look_.holds_at_nodes([&](double share) {
+      return get(select(solves(step, L(share)), L(1.0), L(0.0)), lane) != 0;
+    });
+  }
+
+  MemberSystems<L>& systems_;
+  FieldLook look_;
+  double largest_defect_;              // of accelerations, times h, relative to scales
+  PackRows<W> moved_, turned_, bent_;  // sums of all coordinates
+  PackRows<W> seen_;                   // a motion on the way of the step
+  PackRows<W> found_;                  // accelerations there
+  PackRows<W> arguments_;              // of functions that may be narrow, at three places of the step
+};
+
+}  // namespace pendula
