@@ -25,8 +25,7 @@ namespace {
 
 std::vector<RunSetup> members(int count) {
   Random random(3);
-  const RunRequest asked{
-      .options = {.stages = 4, .step = 0, .tolerance = 1e-8}, .duration = 1, .every = 1};
+  const RunRequest asked{.options = {.stages = 4, .step = 0, .tolerance = 1e-8}, .duration = 1, .every = 1};
   std::vector<RunSetup> members;
   for (int k = 0; k < count; ++k) {
     const auto subject = std::make_shared<ChainSubject<Planar>>(random_chain<Planar>(random, 2));
@@ -44,7 +43,8 @@ std::vector<RunReport> reports(const std::vector<RunSetup>& all, int threads) {
     ++seen.at(number);
     reports.at(number) = report;
   };
-  propagate(all, threads, observe, [] { return false; }, 3);
+  propagate(
+      all, threads, observe, [] { return false; }, 3);
   EXPECT_EQ(seen, std::vector<int>(all.size(), 1));
   return reports;
 }
@@ -273,13 +273,11 @@ TEST(RunsInLanesInSpace, FollowAnglesByPolesWithinSteps) {
   const auto subject = std::make_shared<ChainSubject<Spatial>>(equal_chain<Spatial>(2));
   std::vector<RunSetup> setups;
   for (int k = 0; k < 16; ++k) {
-    setups.push_back(
-        {.subject = subject,
-         .start = Motion(0, Eigen::Vector4d(-1.5 + 0.2 * k, 0.5, 0.3, 1), Eigen::Vector4d(0.5, -0.3, 0.02, 0.1)),
-         .options = {.method = Method::taylor, .step = 0, .tolerance = 1e-10},
-         .duration = 5,
-         .doubted = false,
-         .events = crossings<Spatial>()});
+    setups.push_back({{.options = {.method = Method::taylor, .step = 0, .tolerance = 1e-10}, .duration = 5},
+                      subject,
+                      Motion(0, Eigen::Vector4d(-1.5 + 0.2 * k, 0.5, 0.3, 1), Eigen::Vector4d(0.5, -0.3, 0.02, 0.1)),
+                      false,
+                      crossings<Spatial>()});
   }
   ASSERT_TRUE(lane_kind(setups[0]));
   const std::vector<RunReport> found = run_members(setups);
@@ -356,11 +354,7 @@ TYPED_TEST(RunsInLanes, OfLoadedChainsAreThoseOfOneAlone) {
     const int links = 1 + k % 5;
     const auto subject = std::make_shared<ChainSubject<Space>>(k % 7 == 3 ? random_chain<Space>(random, links)
                                                                           : driven_chain<Space>(random, links));
-    setups.push_back({.subject = subject,
-                      .start = random_state<Space>(random, links),
-                      .options = gauss,
-                      .duration = 1,
-                      .doubted = false});
+    setups.push_back({{gauss, 1}, subject, random_state<Space>(random, links), false});
     setups.back().events.push_back({"x", [=](const Motion& motion) { return subject->observe(motion).points[0]; }});
   }
   for (const RunOptions& options : {fehlberg, gauss}) {
@@ -395,12 +389,7 @@ TEST(RunsOfLoadedChains, ChooseTheQuickestMethodThatWorks) {
   const auto stiff = std::make_shared<ChainSubject<Planar>>(Chain<Planar>(parameters));
   std::vector<RunSetup> setups;
   for (const auto& subject : {damped, stiff, damped}) {
-    setups.push_back({.subject = subject,
-                      .start = Motion(0, Eigen::Vector2d(1, 1.5), Eigen::Vector2d(0, 0)),
-                      .options = chosen(1e-6),
-                      .duration = 5,
-                      .every = 1,
-                      .doubted = false});
+    setups.push_back({{chosen(1e-6), 5, 1}, subject, Motion(0, Eigen::Vector2d(1, 1.5), Eigen::Vector2d(0, 0)), false});
   }
   const std::vector<RunReport> asked = run_members(setups);
   for (RunSetup& setup : setups) setup.chooses_method = true;
@@ -601,18 +590,14 @@ TEST(RunsInLanes, AreDoubtedWhereOthersEndElsewhere) {
   options.method = Method::fehlberg78;
   std::vector<RunSetup> setups;
   for (int k = 0; k < 16; ++k) {
-    setups.push_back({.subject = subject,
-                      .start = Motion(0, Eigen::Vector2d(0.2 * k, 0.2 * k), Eigen::Vector2d(0, 0)),
-                      .options = options,
-                      .duration = 300,
-                      .every = 1,
-                      .doubted = false});
+    setups.push_back(
+        {{options, 300, 1}, subject, Motion(0, Eigen::Vector2d(0.2 * k, 0.2 * k), Eigen::Vector2d(0, 0)), false});
   }
   const std::vector<RunReport> plain = run_members(setups);
   std::vector<RunSetup> finest = setups;
   for (RunSetup& setup : finest) setup.options.tolerance = 1e-13;
   const std::vector<RunReport> right = run_members(finest);
-  for (RunSetup& setup : setups) setup.doubted = true;
+  for (RunSetup& setup : setups) setup.judged = true;
   const std::vector<RunReport> found = run_members(setups);
   int wrong = 0, trusted = 0;
   for (std::size_t k = 0; k < setups.size(); ++k) {

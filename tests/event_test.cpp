@@ -308,7 +308,7 @@ template <class Space>
 RunSetup swinging(Random& random, int links, const RunOptions& options, double duration, int events) {
   const Chain<Space> chain = random_chain<Space>(random, links);
   RunSetup setup{{options, duration}, std::make_shared<ChainSubject<Space>>(chain), random_state<Space>(random, links)};
-  setup.doubted = false;
+  setup.judged = false;
   setup.events = random_events(random, chain, events);
   return setup;
 }
@@ -481,7 +481,7 @@ TEST(Events, OfPairsNoneIsMissedThatIsDeeperThanTheErrorOfTheState) {
           {options, 4},
           std::make_shared<ChainSubject<Planar>>(equal_chain<Planar>(1)),
           State<Planar>::from_angles(Eigen::VectorXd::Constant(1, theta), Eigen::VectorXd::Constant(1, rate))};
-      setup.doubted = false;
+      setup.judged = false;
       setup.events = {
           {"passes", [=](const Motion& motion) { return motion.q[0] - (highest - depth); }},
           {"misses", [=](const Motion& motion) { return motion.q[0] - (highest + depth); }},
@@ -505,7 +505,7 @@ TEST(Events, OfTimeAloneAreFoundWhereTheyHardlyReachZero) {
           {{"reaches", [=](const Motion& motion) { return std::cos(37 * motion.time) - (1 - least); }}}, 10);
       setup.options.method = method;
       setup.options.step = 0;
-      setup.doubted = false;
+      setup.judged = false;
       const double times = 1 + 2 * std::floor(37 * 10 / (2 * std::numbers::pi));  // it starts above
       EXPECT_EQ(pendula::Run(setup).go().events[0].count, static_cast<std::int64_t>(times)) << method << ' ' << least;
     }

@@ -124,7 +124,7 @@ TEST_P(GrazingEvents, HappenTwiceOrNever) {
     RunSetup setup{{GetParam().options, 3},
                    std::make_shared<ChainSubject<Planar>>(random_chain<Planar>(random, links, chain % 2 == 1)),
                    random_state<Planar>(random, links)};
-    setup.doubted = false;
+    setup.judged = false;
     std::vector<Event> turning, events;
     for (Eigen::Index k = 0; k < links; ++k) {
       turning.push_back(

@@ -81,7 +81,7 @@ TEST(MethodChoice, JudgesDampingWhereTheMotionIs) {
 /// The energy does not drift beyond the tolerance.
 TEST(MethodChoice, MovesLongerRunsByASmallerTolerance) {
   RunSetup setup = run_of_chain(2, 1e-6, 2000);
-  setup.doubted = false;
+  setup.judged = false;
   const double tolerance = choose_method(run_of_chain(2, 1e-6)).series_tolerance;
   EXPECT_LT(choose_method(setup).series_tolerance, 0.2 * tolerance);
   EXPECT_LT(pendula::Run(setup).go().energy_error.largest, 3e-10);  // measured 2.1e-11

@@ -44,7 +44,7 @@ struct Watched {
 };
 
 Watched watch(RunSetup setup, const std::vector<io::EventPlan>& plans) {
-  setup.doubted = false;
+  setup.judged = false;
   setup.events = io::events_of(plans, setup.subject, setup.start);
   Times times;
   pendula::Run run(setup);
@@ -67,7 +67,8 @@ template <class Space>
 RunSetup whirling(Random& random, int links, const RunOptions& options) {
   const Eigen::VectorXd rates = random.matrix<Eigen::VectorXd>(Space::dof * links, 1, 5, 8);
   Eigen::VectorXd angles = random.matrix<Eigen::VectorXd>(Space::dof * links, 1, 0.5, 2.5);
-  return {{options, 3}, std::make_shared<ChainSubject<Space>>(random_chain<Space>(random, links)),
+  return {{options, 3},
+          std::make_shared<ChainSubject<Space>>(random_chain<Space>(random, links)),
           Motion(0, angles, rates)};
 }
 
@@ -202,7 +203,7 @@ TEST(NarrowEventsInLanes, AreAllFound) {
         }
         levels.back().emplace_back(plans.size() - 1 - asked.levels.size(), asked.levels.size());
       }
-      setup.doubted = false;
+      setup.judged = false;
       setup.events = io::events_of(plans, setup.subject, setup.start);
       setups.push_back(setup);
     }
@@ -241,7 +242,7 @@ class EventsWithinBounds : public ::testing::TestWithParam<Bounding> {
     RunSetup setup{{options(), 5},
                    std::make_shared<ChainSubject<Space>>(random_chain<Space>(random, links, chain % 2 == 1)),
                    random_state<Space>(random, links)};
-    setup.doubted = false;
+    setup.judged = false;
     const std::string last = std::to_string(links), turns = Space::dof == 1 ? "theta" : "phi";
     const auto level = [&] { return shortest(random.uniform(-2, 2)); };
     const std::vector<io::EventPlan> plans = {plan("a", "theta_1 - " + level()),
@@ -325,7 +326,7 @@ TEST(EventsWithinBoundsOfStiffSteps, AreThoseThatAreFoundWithout) {
                                     RunOptions{.method = Method::radau, .stages = 2, .step = 0.01},
                                     RunOptions{.stages = 2, .step = 0.1}, RunOptions{.stages = 3, .step = 0.1}}) {
     RunSetup setup{{options, 1}, subject, Motion(0, one, 5 * one)};
-    setup.doubted = false;
+    setup.judged = false;
     setup.events =
         io::events_of({plan("a", "theta_dot_1 - 2"), plan("b", "theta_dot_1 - 4.9"), plan("c", "theta_dot_1 + 1")},
                       setup.subject, setup.start);
@@ -438,7 +439,7 @@ TEST(EventsOfTime, ThatLastForAlmostNoTimeAreFound) {
 // More often in a step than can be followed: that is told, once.
 TEST(EventsOfTime, ThatTurnTooOftenAreToldOf) {
   RunSetup setup = slow_motion(few_methods[0], 3);
-  setup.doubted = false;
+  setup.judged = false;
   setup.events = io::events_of({plan("hum", "sin(1e6*t)")}, setup.subject, setup.start);
   const RunReport report = pendula::Run(setup).go();
   ASSERT_EQ(report.warnings.size(), 1U);

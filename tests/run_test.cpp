@@ -151,7 +151,7 @@ TEST(Run, GoesOnAsIfItHadNeverStopped) {
       if (!is_explicit(method) && trial % 3 == 2) setup.options.step = 0;  // of its own choice
       setup.every = static_cast<std::int64_t>(random.uniform(1, 13));
       if (trial % 2 == 1) setup.rows.interval = random.uniform(0.002, 0.1);
-      setup.doubted = false;
+      setup.judged = false;
       Keeper whole, parts;
       const RunReport expected = run_on(setup, 5.0, 0, whole);
       for (const double duration : {0.0, 0.7, 0.7, random.uniform(0.7, 3), 4.0}) {
@@ -332,7 +332,7 @@ Compared compared(RunSetup setup, double interval) {
   found.report = run.go();
   setup.options = {.stages = 8, .step = 0, .tolerance = 1e-16};
   setup.accuracy.error = 0;
-  setup.doubted = false;
+  setup.judged = false;
   pendula::Run exactly(setup);
   exactly.add(exact);
   exactly.go();
@@ -431,9 +431,9 @@ Reached reached(double accuracy, double duration, int count) {
                          random.matrix<Eigen::VectorXd>(Space::dof * links, 1, -2, 2));
     setup.options = {.stages = stages_for(Method::gauss, accuracy), .step = 0, .tolerance = accuracy};
     setup.duration = duration;
-    setup.doubted = false;
+    setup.judged = false;
     reached.plain += compared(setup, duration / 20).largest < 3 * accuracy ? 1 : 0;
-    setup.doubted = true;
+    setup.judged = true;
     setup.accuracy.error = accuracy;
     const Compared found = compared(setup, duration / 40);
     reached.warned += found.report.warnings.empty() ? 0 : 1;

@@ -644,7 +644,7 @@ TEST(Scenario, OverridesWithoutAValueTakeKeysOut) {
   const auto scenario = parsed<Spatial>(spatial_text, {"chain.drive[1]=", "chain.gravity=", "run.step = "});
   EXPECT_TRUE(scenario.chain.drives().empty());
   EXPECT_EQ(scenario.chain.gravity(), 9.81);
-  EXPECT_TRUE(is_adaptive(scenario.run));
+  EXPECT_TRUE(is_adaptive(scenario.options));
   EXPECT_EQ(parsed<Planar>(planar_text, {"chain.masses[2]=", "start.theta[2]="}).chain.links(), 1);
 }
 
@@ -663,7 +663,7 @@ TEST(Scenario, TheEstimateIsWantedUnlessItIsNot) {
 }
 
 TEST(Scenario, WithoutAStepThereAreAsManyStagesAsTheToleranceWants) {
-  const auto run = [](const Overrides& overrides) { return parsed<Planar>(planar_text, overrides).run; };
+  const auto run = [](const Overrides& overrides) { return parsed<Planar>(planar_text, overrides).options; };
   EXPECT_EQ(run({"run.tolerance=1e-4"}).stages, 4);
   EXPECT_EQ(run({"run.tolerance=1e-7"}).stages, 8);
   EXPECT_EQ(run({"run.tolerance=1e-4", "run.stages=5"}).stages, 5);
@@ -750,7 +750,7 @@ TEST(NaturalUnits, OnlyWhatStandsAboveUnitsIsConverted) {
   EXPECT_EQ(natural.chain.drives()[0].amplitude[0], 0.5);
   EXPECT_EQ(natural.chain.drives()[0].frequency, 2);
   EXPECT_EQ(natural.start.theta_dot(), numbers({0.3, 0.7}));
-  EXPECT_EQ(natural.run.step, 1e-2);
+  EXPECT_EQ(natural.options.step, 1e-2);
   EXPECT_EQ(natural.duration, 3);
 }
 

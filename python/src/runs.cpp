@@ -201,7 +201,7 @@ Array rows_at(const Result& result, const std::vector<double>& times, const std:
                 [&](const auto&, RunSetup setup, RunModel&, const auto& stop) {
                   require_its_events(result, setup);
                   setup.rows = {0, times};
-                  setup.doubted = false;
+                  setup.judged = false;
                   Run run(setup);
                   Recorder recorder(again);
                   run.add(recorder);
@@ -233,7 +233,7 @@ void write_page(const Result& result, const std::string& file, const std::string
   with_scenario(source, RunModel(program, python, tell, result.saved.origin.model), result.asked,
                 [&](const auto& scenario, RunSetup setup, RunModel&, const auto& stop) {
                   require_its_events(result, setup);
-                  setup.doubted = false;
+                  setup.judged = false;
                   view::Page page(file, view::scene_of(scenario, source));
                   page.begin_run("");
                   Run run(setup);

@@ -142,7 +142,8 @@ std::optional<double> step_of(const io::RunPlan& plan) {
   for (const io::FeedbackPlan& feedback : plan.feedback) {
     if (feedback.sample > 0) return feedback.sample;
   }
-  return plan.options.method == Method::gauss && plan.options.step > 0 ? std::optional(plan.options.step) : std::nullopt;
+  return plan.options.method == Method::gauss && plan.options.step > 0 ? std::optional(plan.options.step)
+                                                                       : std::nullopt;
 }
 
 /// What the steps of an FMU err by: the tolerance that is asked for, or the accuracy.

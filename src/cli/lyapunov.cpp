@@ -93,8 +93,9 @@ ExitStatus run(const Scenario& scenario, const LyapunovOptions& options) {
   const auto on_way = [&](const LyapunovProgress& progress) {
     if (history) history->add(progress);
   };
-  const LyapunovRun found = find_lyapunov_spectrum(*integrator, scenario.start, longest_step(scenario.options), scenario.duration,
-                                                   options.count, on_way, [&] { return guard.interrupted(); });
+  const LyapunovRun found =
+      find_lyapunov_spectrum(*integrator, scenario.start, longest_step(scenario.options), scenario.duration,
+                             options.count, on_way, [&] { return guard.interrupted(); });
   if (history) history->close();
   if (options.json) {
     std::cout << to_json(found, integrator->statistics());

@@ -226,7 +226,7 @@ class RunSession {
     setup.start.q[0] += copy * options_.apart;
     setup.options = by;
     setup.accuracy.error = 0;
-    setup.doubted = false;
+    setup.judged = false;
     if (page_) {
       const view::Coordinate& first = page_->scene().coordinates.front();
       page_->begin_run(first.name + " + " + rounded(copy * options_.apart) + ' ' + first.unit);

@@ -41,8 +41,8 @@ extern "C" pendula_status pendula_lyapunov(const pendula_tangents* tangents, dou
     std::function<bool()> stop = [] { return false; };
     if (tangents->stop != nullptr) stop = [tangents] { return tangents->stop(tangents->context) != 0; };
     const LyapunovRun found = find_lyapunov_spectrum(
-        *integrator, start, longest_step(options), tangents->duration, static_cast<int>(tangents->count), [](const LyapunovProgress&) {},
-        stop);
+        *integrator, start, longest_step(options), tangents->duration, static_cast<int>(tangents->count),
+        [](const LyapunovProgress&) {}, stop);
     require(found.result.outcome, *model.subject);
     std::ranges::copy(found.exponents, exponents);
     if (errors != nullptr) std::ranges::copy(found.errors, errors);

@@ -32,7 +32,7 @@ std::vector<RunSetup> members_of(const pendula_ensemble& ensemble) {
     if (model.coordinates != coordinates) throw std::invalid_argument("models: expected as many coordinates of each");
     const double* start = ensemble.starts + k * 2 * coordinates;
     members.push_back({asked, model.subject, motion_of(model, ensemble.time, start, start + coordinates)});
-    members.back().doubted = false;
+    members.back().judged = false;
   }
   return members;
 }

@@ -2,8 +2,8 @@
 
 #include <algorithm>
 #include <filesystem>
-#include <pendula/run/doubts.hpp>
 #include <pendula/run/library.hpp>
+#include <pendula/run/trust.hpp>
 #include <pendula/version.hpp>
 #include <utility>
 #include <variant>
@@ -39,7 +39,7 @@ EnsembleJob::EnsembleJob(const EnsembleSource& source, MemberScenarios::Tell tel
       runs_(scenarios_, kept_, std::move(stop)) {}
 
 bool EnsembleJob::go_in_lanes() const {
-  RunSetup setup = MemberScenario(base_).setup();
+  RunSetup setup = MemberScenario(base_).setup;
   setup.chooses_method |= scenarios_.plan().chooses_method;
   return lane_kind(setup) || lane_kind(setup, lane_options(setup));
 }

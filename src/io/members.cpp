@@ -64,7 +64,7 @@ double& number_at(Motion& start, Eigen::Index place) {
 
 /// Whether the start of a member would be read without an error.
 bool can_start(const MemberScenario& member) {
-  const Motion& start = member.start;
+  const Motion& start = member.setup.start;
   if (!start.q.allFinite() || !start.v.allFinite()) return false;
   const auto* const other = std::get_if<SystemScenario>(member.scenario.get());
   return other == nullptr || other->system->has_inertia(start.q);
@@ -74,17 +74,15 @@ bool can_start(const MemberScenario& member) {
 
 MemberScenario::MemberScenario(AnyScenario read)
     : scenario(std::make_shared<const AnyScenario>(std::move(read))),
-      subject(std::visit([](const auto& of) { return subject_of(of); }, *scenario)),
-      start(std::visit([](const auto& of) -> Motion { return of.start; }, *scenario)) {}
-
-RunSetup MemberScenario::setup() const {
-  RunSetup setup{plan(), subject, start};
-  if (setup.rows.chosen && !is_adaptive(setup.options)) setup.every = 10;  // steps from one look at the energy to the next
+      setup(std::visit(
+          [](const auto& of) {
+            return RunSetup{of, subject_of(of), of.start, false};
+          },
+          *scenario)) {
+  if (setup.rows.chosen && !is_adaptive(setup.options)) setup.every = 10;  // from one look at the energy to the next
   setup.rows = {};
   if (!plan().places.contains("accuracy")) setup.accuracy = {};
   setup.checkpoint = std::numeric_limits<double>::infinity();
-  setup.doubted = false;
-  return setup;
 }
 
 MemberScenarios::MemberScenarios(ScenarioText text, std::vector<std::string> overrides, Toolchain toolchain, Tell tell)
@@ -114,7 +112,7 @@ MemberScenario MemberScenarios::quickly_of_member(std::int64_t member) {
   if (shared_) {
     MemberScenario found = shared_->scenario;
     for (std::size_t k = 0; k < numbers.size(); ++k) {
-      for (const Eigen::Index place : shared_->places[k]) number_at(found.start, place) = numbers[k];
+      for (const Eigen::Index place : shared_->places[k]) number_at(found.setup.start, place) = numbers[k];
     }
     if (can_start(found)) return found;
   }
@@ -137,7 +135,7 @@ std::optional<MemberScenarios::Shared> MemberScenarios::find_shared() {
   try {
     Shared shared{MemberScenario(with(one)), std::vector<std::vector<Eigen::Index>>(keys.size())};
     MemberScenario second(with(other));
-    Motion &first = shared.scenario.start, &then = second.start;
+    Motion &first = shared.scenario.setup.start, &then = second.setup.start;
     for (Eigen::Index place = 0; place < first.q.size() + first.v.size(); ++place) {
       const double here = number_at(first, place), there = number_at(then, place);
       if (here == there) continue;
@@ -173,31 +171,26 @@ MemberRuns::MemberRuns(MemberScenarios& scenarios, const KeptQuantities& kept, s
 struct MemberRuns::Member {
   std::optional<MemberScenario> scenario;  // empty if it cannot be read
   std::string problem;
-  std::optional<RunSetup> setup;  // of a member that waits to be run together with others
-  bool is_together = false;
-  RunReport report;
-  bool is_looked_at = false;
+  std::optional<RunReport> report;           // empty until the members in lanes are moved
   std::optional<LyapunovSpectrum> exponent;  // if it is kept, and was found in lanes
 };
 
 DoneChunk MemberRuns::run(const Chunk& members) const {
   std::vector<Member> all;
-  std::vector<RunSetup> waiting;
+  std::vector<RunSetup> in_lanes;
   SharedExpressions shared;
   for (std::int64_t number = members.first; number < members.last; ++number) {
-    all.push_back(member(number, shared));
-    Member& last = all.back();
-    last.is_together = last.setup.has_value();
-    if (last.is_together) waiting.push_back(*std::exchange(last.setup, std::nullopt));
+    const Member& last = all.emplace_back(member(number, shared));
+    if (last.scenario && !last.report) in_lanes.push_back(last.scenario->setup);
   }
-  std::vector<RunReport> reports = run_members(waiting, stop_);
+  std::vector<RunReport> reports = run_members(in_lanes, stop_);
   if (kept_.chaos()) find_exponents(all);
   auto next = reports.begin();
   DoneChunk done;
   done.members = members;
   done.rows.reserve(static_cast<std::size_t>(members.size()) * width_);
   for (std::size_t k = 0; k < all.size(); ++k) {
-    if (all[k].is_together) all[k].report = std::move(*next++);
+    if (all[k].scenario && !all[k].report) all[k].report = std::move(*next++);
     const std::string message = append(all[k], done.rows);
     if (!message.empty()) done.messages.push_back({members.first + static_cast<std::int64_t>(k), message});
   }
@@ -232,17 +225,14 @@ MemberRuns::Member MemberRuns::member(std::int64_t number, SharedExpressions& sh
 MemberRuns::Member MemberRuns::member_of(MemberScenario scenario, std::int64_t number,
                                          SharedExpressions& shared) const {
   Member member;
-  member.scenario = std::move(scenario);
-  RunSetup setup = member.scenario->setup();
+  RunSetup& setup = member.scenario.emplace(std::move(scenario)).setup;
   setup.chooses_method |= plan_.chooses_method;
   setup.events = events_of(member.scenario->plan().events, setup.subject, setup.start, shared);
   // Trials for an accuracy say of each member how far it can be trusted.
-  setup.doubted = setup.estimate && (setup.accuracy.error > 0 || is_looked_at(number));
-  member.is_looked_at = setup.doubted;
-  if (lane_kind(setup, lane_options(setup))) {
-    member.setup = std::move(setup);
-  } else {
-    member.report = run_alone(*member.scenario, std::move(setup));
+  setup.judged = setup.estimate && (setup.accuracy.error > 0 || is_looked_at(number));
+  if (!lane_kind(setup, lane_options(setup))) {
+    Run alone = told_at_keys(member.scenario->plan(), scenarios_.text().name, [&] { return Run(setup); });
+    member.report = alone.go(stop_);
   }
   return member;
 }
@@ -254,8 +244,10 @@ void MemberRuns::find_exponents(std::vector<Member>& all) const {
   std::vector<Member*> members;
   for (Member& member : all) {
     if (!member.scenario) continue;
-    RunSetup setup = member.scenario->setup();
+    RunSetup setup = member.scenario->setup;
     setup.chooses_method = plan_.chooses_method;
+    setup.events.clear();
+    setup.judged = false;
     if (!setup.chooses_method && !is_explicit(setup.options.method)) continue;
     setups.push_back(std::move(setup));
     members.push_back(&member);
@@ -265,28 +257,24 @@ void MemberRuns::find_exponents(std::vector<Member>& all) const {
   for (std::size_t k = 0; k < members.size(); ++k) members[k]->exponent = std::move(found[k]);
 }
 
-RunReport MemberRuns::run_alone(const MemberScenario& scenario, RunSetup setup) const {
-  Run one = told_at_keys(scenario.plan(), scenarios_.text().name, [&] { return Run(std::move(setup)); });
-  return one.go(stop_);
-}
-
 // Appends the row of a member. Returns its message, or an empty one.
 std::string MemberRuns::append(const Member& member, std::vector<double>& rows) const {
   const std::size_t begin = rows.size();
   const auto add = [&](const MemberScenario& scenario) {
-    const RunReport& report = member.report;
+    const RunReport& report = *member.report;
+    const Subject& subject = *scenario.setup.subject;
     if (report.end == RunEnd::stopped) throw Interrupted();
     std::vector<std::string> events;
     events.reserve(scenario.plan().events.size());
     for (const EventPlan& event : scenario.plan().events) events.push_back(event.name);
-    const Ending ending = ending_of(report, scenario.subject->coordinates(), events, scenario.subject->switches());
+    const Ending ending = ending_of(report, subject.coordinates(), events, subject.switches());
     LyapunovSpectrum spectrum;
     if (kept_.chaos()) spectrum = member.exponent ? *member.exponent : leading_exponent(scenario);
     const int status = member_status(ending.status);
     const auto trusted = static_cast<double>(report.warnings.empty() ? Trusted::yes : Trusted::no);
     rows.push_back(status);
-    rows.push_back(member.is_looked_at && is_ok(status) ? trusted : std::nan(""));
-    kept_.append(*scenario.subject, report, spectrum, rows);
+    rows.push_back(scenario.setup.judged && is_ok(status) ? trusted : std::nan(""));
+    kept_.append(subject, report, spectrum, rows);
     return ending.message;
   };
   std::string problem = member.problem;
@@ -304,9 +292,10 @@ std::string MemberRuns::append(const Member& member, std::vector<double>& rows) 
 LyapunovSpectrum MemberRuns::leading_exponent(const MemberScenario& scenario) const {
   const RunPlan& plan = scenario.plan();
   LyapunovRun found = told_at_keys(plan, scenarios_.text().name, [&] {
-    const auto integrator = scenario.subject->make_integrator(plan.options);
+    const auto integrator = scenario.setup.subject->make_integrator(plan.options);
     return find_lyapunov_spectrum(
-        *integrator, scenario.start, longest_step(plan.options), plan.duration, 1, [](const LyapunovProgress&) {}, stop_);
+        *integrator, scenario.setup.start, longest_step(plan.options), plan.duration, 1, [](const LyapunovProgress&) {},
+        stop_);
   });
   if (found.result.stopped) throw Interrupted();
   return found;

@@ -58,16 +58,14 @@ struct Interrupted {};
 /// What a member runs. Members that differ in their starts alone share all else.
 struct MemberScenario {
   std::shared_ptr<const AnyScenario> scenario;  ///< but for its start
-  std::shared_ptr<const Subject> subject;
-  Motion start;
+  /// Without events, and not judged. Trials for an accuracy are made only if one is asked for.
+  RunSetup setup;
 
   explicit MemberScenario(AnyScenario read);
 
   const RunPlan& plan() const {
     return std::visit([](const auto& read) -> const RunPlan& { return read; }, *scenario);
   }
-  /// Without events. Trials for an accuracy are made only if one is asked for.
-  RunSetup setup() const;
 };
 
 /// The scenario of an ensemble, and those of its members, which have other numbers.
@@ -135,7 +133,6 @@ class MemberRuns {
   Member member(std::int64_t number, SharedExpressions& shared) const;
   Member member_of(MemberScenario scenario, std::int64_t number, SharedExpressions& shared) const;
   void find_exponents(std::vector<Member>& all) const;
-  RunReport run_alone(const MemberScenario& scenario, RunSetup setup) const;
   std::string append(const Member& member, std::vector<double>& rows) const;
   LyapunovSpectrum leading_exponent(const MemberScenario& scenario) const;
 

@@ -42,7 +42,8 @@ std::string plural(std::int64_t count, const std::string& noun) {
 
 std::string rows_text(const Summary& summary, const std::string& unit) {
   if (summary.asked.rows.interval > 0) return "a row every " + shortest(summary.asked.rows.interval) + unit;
-  if (summary.asked.rows.any()) return "rows at " + plural(static_cast<std::int64_t>(summary.asked.rows.times.size()), "time");
+  if (summary.asked.rows.any())
+    return "rows at " + plural(static_cast<std::int64_t>(summary.asked.rows.times.size()), "time");
   return "a row every " + plural(summary.asked.every, "step");
 }
 
@@ -215,8 +216,9 @@ std::string end_of_run(const Summary& summary) {
   std::string text = place(summary) + events_text(summary);
   if (summary.event_file) text += line("events", *summary.event_file);
   if (!summary.ending.event.empty()) {
-    text += line("stopped by", "event " + summary.ending.event + ", before the end at " + shortest(summary.asked.duration) +
-                                   std::string(unit_names(summary.model.natural).time));
+    text +=
+        line("stopped by", "event " + summary.ending.event + ", before the end at " + shortest(summary.asked.duration) +
+                               std::string(unit_names(summary.model.natural).time));
   }
   if (summary.trajectory) text += line("trajectory", *summary.trajectory + ", " + plural(summary.rows_written, "row"));
   if (summary.view) text += line("page", *summary.view + ", to open in a browser");

@@ -146,6 +146,7 @@ Outcome HeldMembers::go_alone(Numbers inputs, Numbers state, const MemberEnd& en
   const Eigen::Map<const Eigen::VectorXd> q(state.data(), size), v(state.data() + size, size);
   const std::unique_ptr<Integrator> integrator = with_inputs(subject_, inputs)->make_integrator(options_);
   Outcome outcome = integrator->start(Motion(0, q, v));
+  const double step = longest_step(options_);
   while (outcome && integrator->time() < duration_) {
     const double left = duration_ - integrator->time();
     outcome = integrator->step(detail::ends_before(step, left) ? step : left);

@@ -129,7 +129,7 @@ void try_in_lanes(std::span<const RunSetup> setups, RunOptions (*options_of)(con
     const auto kind = lane_kind(setups[k], options_of(setups[k]));
     if (!kind || tried[k].kind == kind) continue;
     tried[k].kind = kind;
-    (is_estimated(setups[k]) ? followed : others)[*kind].push_back(k);
+    (setups[k].is_estimated() ? followed : others)[*kind].push_back(k);
   }
   for (const RunsByKind* kinds : {&followed, &others}) {
     for (const auto& [kind, numbers] : *kinds) {
@@ -147,14 +147,14 @@ void try_in_lanes(std::span<const RunSetup> setups, RunOptions (*options_of)(con
 // Takes second looks at the runs that lanes have moved to their ends.
 void look_again_in_lanes(std::span<const RunSetup> setups, const std::function<bool()>& stop,
                          std::vector<Tried>& tried) {
-  std::vector<Doubted> doubted;
+  std::vector<Judged> judged;
   for (std::size_t k = 0; k < setups.size(); ++k) {
     Tried& one = tried[k];
     if (one.report && one.track && one.report->end != RunEnd::stopped) {
-      doubted.push_back({setups[k], *one.report, *one.track});
+      judged.push_back({setups[k], *one.report, *one.track});
     }
   }
-  look_again(doubted, stop);
+  look_again(judged, stop);
 }
 
 }  // namespace

@@ -9,11 +9,11 @@
 #include <optional>
 #include <pendula/ensemble/lane_runs.hpp>
 #include <pendula/numeric/number_text.hpp>
-#include <pendula/run/doubts.hpp>
 #include <pendula/run/event.hpp>
 #include <pendula/run/run.hpp>
 #include <pendula/run/run_report.hpp>
 #include <pendula/run/track.hpp>
+#include <pendula/run/trust.hpp>
 #include <span>
 #include <string>
 #include <utility>
@@ -21,22 +21,17 @@
 
 namespace pendula::detail {
 
-/// Whether a run is to be compared with another one.
-inline bool is_estimated(const RunSetup& setup) {
-  return setup.doubted && setup.estimate;
-}
-
 /// A track for a run in lanes: of many at once, so at most 256 kB.
 inline Track lane_track() {
   return Track(Track::apart / 2, std::size_t{1} << 15).by_dense_output();
 }
 
 /// A run in lanes that gets a second look.
-struct Doubted {
+struct Judged {
   const RunSetup& setup;
   RunReport& report;
   const Track& track;
-  Doubt doubt = {};  // NOLINT(readability-redundant-member-init): left out in initializers
+  Warning warning = {};  // NOLINT(readability-redundant-member-init): left out in initializers
 };
 
 /// Lanes are compiled for four and eight stages. With a tolerance, the other run has the other of these numbers. With
@@ -46,8 +41,9 @@ inline RunOptions in_lanes(RunOptions options, const RunOptions& run) {
   return options;
 }
 
-/// A doubt if another run finds other events, or at other times.
-inline Doubt of_events(const RunSetup& setup, const SecondLook& look, const RunReport& report, const RunReport& other) {
+/// A warning if another run finds other events, or at other times.
+inline Warning of_events(const RunSetup& setup, const SecondLook& look, const RunReport& report,
+                         const RunReport& other) {
   for (std::size_t k = 0; k < setup.events.size(); ++k) {
     const EventTally &one = report.events[k], &another = other.events[k];
     const double off = std::abs(one.first - another.first) * look.trusted;
@@ -65,16 +61,16 @@ inline Doubt of_events(const RunSetup& setup, const SecondLook& look, const RunR
 
 /// Tracks of runs in lanes are dense output, whose errors are larger than those of steps: they only tell whether the
 /// motion has gone elsewhere on the way. The ends are compared exactly.
-inline Doubt of_other(const Doubted& member, const SecondLook& look, const RunReport& other, const Track& track) {
+inline Warning of_other(const Judged& member, const SecondLook& look, const RunReport& other, const Track& track) {
   static constexpr double elsewhere = 0.5;
   const Separation parted(*member.setup.subject, member.track, track);
   const bool is_elsewhere = parted.largest() > elsewhere;
-  Doubt doubt = of_second_look(member.setup, look, is_elsewhere ? parted : parted.of_ends(), member.report.trust);
-  return doubt ? doubt : of_events(member.setup, look, member.report, other);
+  Warning warning = of_second_look(member.setup, look, is_elsewhere ? parted : parted.of_ends(), member.report.trust);
+  return warning ? warning : of_events(member.setup, look, member.report, other);
 }
 
 /// If no other run goes in lanes: the member is run alone, with a second look, and its end is compared.
-inline Doubt of_run_alone(const Doubted& member, const std::function<bool()>& stop) {
+inline Warning of_run_alone(const Judged& member, const std::function<bool()>& stop) {
   const RunSetup& setup = member.setup;
   const RunReport alone = Run(setup).go(stop);
   member.report.trust = alone.trust;
@@ -87,16 +83,16 @@ inline Doubt of_run_alone(const Doubted& member, const std::function<bool()>& st
   return of_events(setup, {setup.options, "alone, not in lanes,", 1, 1}, member.report, alone);
 }
 
-/// Looks at members again, each by the run that choose(member) gives; if it gives none, the doubt stays as it is.
+/// Looks at members again, each by the run that choose(member) gives; if it gives none, the warning stays as it is.
 template <class Choose>
-void look_by(std::span<Doubted* const> members, Choose choose, const std::function<bool()>& stop) {
-  std::vector<Doubted*> looked;
+void look_by(std::span<Judged* const> members, Choose choose, const std::function<bool()>& stop) {
+  std::vector<Judged*> looked;
   std::vector<SecondLook> looks;
   std::vector<RunSetup> setups;
   std::vector<Track> tracks;
   RunsByKind kinds;
   std::vector<std::size_t> others;  // that do not go in lanes
-  for (Doubted* const member : members) {
+  for (Judged* const member : members) {
     const RunOptions& run = member->report.options;
     std::optional<SecondLook> look = choose(*member);
     if (!look) continue;
@@ -105,7 +101,7 @@ void look_by(std::span<Doubted* const> members, Choose choose, const std::functi
     setup.options = in_lanes(look->options, run);
     setup.start.q *= 1 + std::max(share, std::numeric_limits<double>::epsilon());
     setup.start.v *= 1 + std::max(share, std::numeric_limits<double>::epsilon());
-    setup.doubted = false;
+    setup.judged = false;
     const std::optional<LaneKind> kind = lane_kind(setup);
     (kind ? kinds[*kind] : others).push_back(looked.size());
     looked.push_back(member);
@@ -125,33 +121,33 @@ void look_by(std::span<Doubted* const> members, Choose choose, const std::functi
       } else if (reports[j]->end == RunEnd::stopped) {
         looked[k]->report.end = RunEnd::stopped;
       } else {
-        looked[k]->doubt = of_other(*looked[k], looks[k], *reports[j], tracks[k]);
+        looked[k]->warning = of_other(*looked[k], looks[k], *reports[j], tracks[k]);
       }
     }
   }
   for (const std::size_t k : others) {
-    looked[k]->doubt = of_run_alone(*looked[k], stop);
+    looked[k]->warning = of_run_alone(*looked[k], stop);
     if (stop()) looked[k]->report.end = RunEnd::stopped;
   }
 }
 
 /// As Run does: first by a coarser run, which takes less time; if that doubts a member, by a finer one.
-inline void look_again(std::vector<Doubted>& members, const std::function<bool()>& stop) {
-  std::vector<Doubted*> left;
+inline void look_again(std::vector<Judged>& members, const std::function<bool()>& stop) {
+  std::vector<Judged*> left;
   left.reserve(members.size());
-  for (Doubted& member : members) left.push_back(&member);
+  for (Judged& member : members) left.push_back(&member);
   look_by(
       left,
-      [](const Doubted& member) {
+      [](const Judged& member) {
         const RunReport& run = member.report;
         return std::optional(coarser(run.options, run.statistics, member.setup.duration));
       },
       stop);
-  std::erase_if(left, [](const Doubted* member) { return !member->doubt || member->report.end == RunEnd::stopped; });
+  std::erase_if(left, [](const Judged* member) { return !member->warning || member->report.end == RunEnd::stopped; });
   look_by(
-      left, [](const Doubted& member) { return finer(member.report.options, member.setup.duration); }, stop);
-  for (Doubted& member : members) {
-    if (member.doubt) member.report.warnings.push_back(*std::move(member.doubt));
+      left, [](const Judged& member) { return finer(member.report.options, member.setup.duration); }, stop);
+  for (Judged& member : members) {
+    if (member.warning) member.report.warnings.push_back(*std::move(member.warning));
   }
 }
 

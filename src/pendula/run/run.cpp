@@ -1,10 +1,10 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <pendula/run/doubts.hpp>
 #include <pendula/run/method_choice.hpp>
 #include <pendula/run/run.hpp>
 #include <pendula/run/schedule.hpp>
+#include <pendula/run/trust.hpp>
 #include <stdexcept>
 #include <string>
 #include <utility>
@@ -98,7 +98,7 @@ Track Run::try_out(const RunOptions& options, double share, Track track,
   trial.start.v *= 1 + share;
   trial.every = std::numeric_limits<std::int64_t>::max();
   trial.rows = {};
-  trial.doubted = false;
+  trial.judged = false;
   trial.chooses_method = false;
   std::erase_if(trial.events, [](const Event& event) { return !event.stop; });
   Run run(std::move(trial));
@@ -172,10 +172,10 @@ RunReport Run::go(const Checkpoint* from, const std::function<bool()>& stop) {
   RunReport report;
   report.stepping_seconds = std::nan("");
   const bool has_trials = from == nullptr && is_aimed() && kept_.aim.finest;
-  if (is_estimated()) track_ = has_trials ? Track::at_times_of(*kept_.aim.finest) : own_track();
+  if (setup_.is_estimated()) track_ = has_trials ? Track::at_times_of(*kept_.aim.finest) : own_track();
   integrate(from, stop, report);
   conclude(report);
-  doubt(report, from != nullptr, stop);
+  judge(report, from != nullptr, stop);
   return report;
 }
 
@@ -317,11 +317,11 @@ void Run::come_by(const RowPlace& place, bool last) {
 }
 
 // A run that went on has two answers: that of the trials before it, and that of a second look at what is after them.
-void Run::doubt(RunReport& report, bool went_on, const std::function<bool()>& stop) {
+void Run::judge(RunReport& report, bool went_on, const std::function<bool()>& stop) {
   report.warnings = event_warnings(setup_.events, report.events);
-  if (!setup_.doubted || (report.end != RunEnd::complete && report.end != RunEnd::event)) return;
-  const auto add = [&](detail::Doubt doubt) {
-    if (doubt) report.warnings.push_back(*std::move(doubt));
+  if (!setup_.judged || (report.end != RunEnd::complete && report.end != RunEnd::event)) return;
+  const auto add = [&](detail::Warning warning) {
+    if (warning) report.warnings.push_back(*std::move(warning));
   };
   add(detail::of_energy(*setup_.subject, setup_.options, kept_.record.balance()));
   add(detail::of_pole(*setup_.subject, setup_.options, report));
@@ -343,7 +343,7 @@ void Run::doubt(RunReport& report, bool went_on, const std::function<bool()>& st
 
 // Compares with a run that takes less time. If that says that this run cannot be trusted, compares with one that takes
 // more; with constant steps only if the first comparison run diverged early.
-detail::Doubt Run::look_again(RunReport& report, const std::function<bool()>& stop) {
+detail::Warning Run::look_again(RunReport& report, const std::function<bool()>& stop) {
   bool stopped = false;
   integrator_.reset();
   double asked = is_adaptive(setup_.options) ? setup_.options.tolerance : 0;
@@ -367,12 +367,12 @@ detail::Doubt Run::look_again(RunReport& report, const std::function<bool()>& st
                                                   : detail::coarser(setup_.options, report.statistics, setup_.duration);
   const Separation first = compare(coarser);
   if (stopped) return unknown;
-  detail::Doubt doubt = detail::of_second_look(setup_, coarser, first, report.trust);
-  if (!doubt) return doubt;
+  detail::Warning warning = detail::of_second_look(setup_, coarser, first, report.trust);
+  if (!warning) return warning;
   const double begin = setup_.start.time, end = report.last.time;
   const bool is_soon = first.within(detail::visible / coarser.trusted, begin) < begin + (end - begin) / 2;
   const std::optional<detail::SecondLook> finer = detail::finer(setup_.options, setup_.duration);
-  if (!finer || ends_between || !(is_adaptive(setup_.options) || is_soon)) return doubt;
+  if (!finer || ends_between || !(is_adaptive(setup_.options) || is_soon)) return warning;
   const Separation second = compare(*finer);
   return stopped ? unknown : detail::of_second_look(setup_, *finer, second, report.trust);
 }

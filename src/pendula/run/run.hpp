@@ -7,7 +7,6 @@
 #include <memory>
 #include <optional>
 #include <pendula/run/accuracy.hpp>
-#include <pendula/run/doubts.hpp>
 #include <pendula/run/event.hpp>
 #include <pendula/run/event_watch.hpp>
 #include <pendula/run/integrator.hpp>
@@ -16,6 +15,7 @@
 #include <pendula/run/run_report.hpp>
 #include <pendula/run/schedule.hpp>
 #include <pendula/run/track.hpp>
+#include <pendula/run/trust.hpp>
 #include <pendula/run/viewer.hpp>
 #include <string>
 #include <utility>
@@ -50,7 +50,7 @@ class Run {
     viewers_.emplace_back(*setup_.subject, observer, times);
   }
 
-  /// Runs to the end, or until `stop`, asked after every step, says so. Then looks for reasons to doubt the result,
+  /// Runs to the end, or until `stop`, asked after every step, says so. Then looks for reasons not to trust the result,
   /// which may take a second run with longer steps. A failing run does not throw: the report says how it failed.
   RunReport go(const std::function<bool()>& stop = [] { return false; });
 
@@ -84,9 +84,8 @@ class Run {
   void come_by(const RowPlace& place, bool last);
   void conclude(RunReport& report);
   void finish(RunReport& report);
-  void doubt(RunReport& report, bool went_on, const std::function<bool()>& stop);
-  detail::Doubt look_again(RunReport& report, const std::function<bool()>& stop);
-  bool is_estimated() const { return setup_.doubted && setup_.estimate; }
+  void judge(RunReport& report, bool went_on, const std::function<bool()>& stop);
+  detail::Warning look_again(RunReport& report, const std::function<bool()>& stop);
 
   /// The state of a run besides its integrator, for checkpoints.
   struct CheckpointState {

@@ -26,7 +26,7 @@ struct RunRequest {
   std::int64_t every = 10;  ///< steps from row to row; the first and the last state are always rows
   RowTimes rows = {};       ///< if any: rows at these times instead of `every`
   Accuracy accuracy = {};   ///< if given, the tolerance is found from it by trials
-  bool estimate = true;     ///< whether to run a second time to estimate the error, if doubted
+  bool estimate = true;     ///< whether to run a second time to estimate the error, if judged
   double checkpoint = std::numeric_limits<double>::infinity();  ///< wall time between checkpoints  [s]
   bool chooses_method = false;  ///< whether Taylor series take the place of Gauss steps that take longer
 };
@@ -35,9 +35,12 @@ struct RunRequest {
 struct RunSetup : RunRequest {
   std::shared_ptr<const Subject> subject;
   Motion start;
-  bool doubted = true;              ///< whether to look for reasons to doubt the result
-  std::vector<Event> events = {};   ///< to find
-  double motion_tolerance = 0;      ///< that series were chosen for: that of `options` is one of a step then
+  bool judged = true;              ///< whether to look for reasons not to trust the result
+  std::vector<Event> events = {};  ///< to find
+  double motion_tolerance = 0;     ///< that series were chosen for: that of `options` is one of a step then
+
+  /// Whether to compare the run with another one, of which its error is estimated.
+  bool is_estimated() const { return judged && estimate; }
 };
 
 /// How far a run can be trusted, found by comparison with another run.
@@ -69,7 +72,7 @@ struct RunReport {
   std::string method_reason;         ///< why this method; empty if it was asked for
   double motion_tolerance = 0;       ///< as RunSetup's
   std::optional<AccuracyAim> aimed;  ///< for RunSetup::accuracy
-  Trust trust;                       ///< if the run was doubted
+  Trust trust;                       ///< if the run was judged
   Description description;
   Statistics statistics;
   double stepping_seconds = 0;  ///< wall time in the stepping loop alone; NaN if a row ended the run

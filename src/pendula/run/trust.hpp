@@ -15,7 +15,7 @@ namespace pendula {
 
 namespace detail {
 
-using Doubt = std::optional<std::string>;
+using Warning = std::optional<std::string>;
 
 inline std::string smaller_step_advice(const RunOptions& run) {
   if (is_adaptive(run)) return "a smaller run.tolerance may help";
@@ -24,7 +24,7 @@ inline std::string smaller_step_advice(const RunOptions& run) {
 }
 
 /// The energy of an undamped motion is known; that of a damped one never grows.
-inline Doubt of_energy(const Subject& subject, const RunOptions& run, const EnergyBalance& balance) {
+inline Warning of_energy(const Subject& subject, const RunOptions& run, const EnergyBalance& balance) {
   static constexpr double trusted = 1e-3;
   if (!subject.balances(run.method)) return {};
   const bool sinks = run.method == Method::radau && subject.damped();
@@ -35,7 +35,7 @@ inline Doubt of_energy(const Subject& subject, const RunOptions& run, const Ener
 }
 
 /// Near a pole φ changes faster than steps of constant size follow, even when they are divided.
-inline Doubt of_pole(const Subject& subject, const RunOptions& run, const RunReport& report) {
+inline Warning of_pole(const Subject& subject, const RunOptions& run, const RunReport& report) {
   const std::int64_t rejected = report.statistics.rejected_steps;
   if (is_adaptive(run) || !subject.has_poles() || report.description.solver != "dense" || rejected == 0) return {};
   return "the dense solver came near a pole of (theta, phi) and took " + std::to_string(rejected) +
@@ -60,7 +60,7 @@ inline bool misses(const RunOptions& run, double defect) {
 }
 
 /// `missed` is when the first such step began.
-inline Doubt of_defect(const RunSetup& setup, double defect, std::optional<double> missed, Trust& trust) {
+inline Warning of_defect(const RunSetup& setup, double defect, std::optional<double> missed, Trust& trust) {
   const RunOptions& run = setup.options;
   if (!missed) return {};
   trust.until = std::min(trust.until, *missed);
@@ -70,7 +70,7 @@ inline Doubt of_defect(const RunSetup& setup, double defect, std::optional<doubl
 
 /// Steps missed something narrow in the forces, and rows show the effect from some time on. With constant steps, they
 /// may show a part of it one step earlier: that step may have met the beginning.
-inline Doubt of_unseen(const RunSetup& setup, const Statistics& statistics, Trust& trust) {
+inline Warning of_unseen(const RunSetup& setup, const Statistics& statistics, Trust& trust) {
   if (std::isinf(statistics.unseen_from)) return {};
   const double before = is_adaptive(setup.options) ? 0 : setup.options.step;
   const double from = std::max(setup.start.time, statistics.unseen_from - before);
@@ -82,7 +82,7 @@ inline Doubt of_unseen(const RunSetup& setup, const Statistics& statistics, Trus
 }
 
 /// A start from which the equations have more than one solution.
-inline Doubt of_fork(const RunSetup& setup, Trust& trust) {
+inline Warning of_fork(const RunSetup& setup, Trust& trust) {
   const std::optional<std::size_t> at = setup.subject->fork(setup.start);
   if (!at) return {};
   trust.until = setup.start.time;
@@ -94,8 +94,8 @@ inline Doubt of_fork(const RunSetup& setup, Trust& trust) {
 
 /// Reports what the trials before the run found. `parted` is the distance of the run from the finest trial, if
 /// compared.
-inline Doubt of_aim(const RunSetup& setup, const std::optional<Separation>& parted, const AccuracyAim& aim,
-                    Trust& trust) {
+inline Warning of_aim(const RunSetup& setup, const std::optional<Separation>& parted, const AccuracyAim& aim,
+                      Trust& trust) {
   const double wanted = setup.accuracy.error, trusted = close_to_wanted * wanted, start = setup.start.time;
   const double error = std::max({aim.error, parted ? parted->largest() : 0, aim.disputed});
   if (std::isfinite(aim.error) && error <= together) trust.expected_error = error;
@@ -186,7 +186,7 @@ inline double trusted_error(const RunSetup& setup) {
 }
 
 /// Where the two runs diverge depends on the steps or on the chaos of the motion.
-inline Doubt of_second_look(const RunSetup& setup, const SecondLook& look, const Separation& parted, Trust& trust) {
+inline Warning of_second_look(const RunSetup& setup, const SecondLook& look, const Separation& parted, Trust& trust) {
   const double start = setup.start.time, trusted = trusted_error(setup), error = parted.largest() * look.factor;
   trust.expected_error = error <= visible ? error : std::numeric_limits<double>::quiet_NaN();
   trust.until = parted.within(trusted / look.trusted, start);
