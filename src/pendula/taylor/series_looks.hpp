@@ -57,15 +57,21 @@ class SeriesLooks {
     for (int k = 1; k < looks && any(held & is_far); ++k) {
       held = held & (solves(step, L(static_cast<double>(k) / looks)) | !is_far);
     }
-    see(step.series, L(0.5) * tau);
-    find_arguments(fma(L(0.5), step.size, step.time), 1);
     for (std::size_t i = 0; i < n; ++i) {
       to_row(step.series.coefficient(0, i), seen_[i]);
       to_row(step.series.velocity(i), seen_[n + i]);
     }
     find_arguments(step.time, 0);
-    const Mask is_doubtful = held & arguments_change();
-    return any(is_doubtful) ? held & solves_closely(step, is_doubtful) : held;
+    const L middle = fma(L(0.5), step.size, step.time);
+    see(step.series, L(0.5) * tau);
+    find_arguments(middle, 1);
+    const Change change = change_of_arguments();
+    const Mask is_larger = held & !change.is_small, is_close = is_larger & !change.is_even;
+    if (any(is_larger & !is_close)) {
+      find_accelerations(middle);
+      held = held & (bends_so(step, L(0.5) * tau) | !(is_larger & !is_close));
+    }
+    return any(held & is_close) ? held & solves_closely(step, held & is_close) : held;
   }
 
  private:
@@ -74,6 +80,7 @@ class SeriesLooks {
   // closely functions that may be narrow are looked at, in nodes of a Gauss method.
   static constexpr int looks = 3, most_looks = 8;
   static constexpr double far_turn = 0.5, far_way = 0.25;  // rad; of the largest length
+  static constexpr double largest_ratio = 10;  // of bases of powers in a step, which looks at three places show
 
   /// In which members the step is so long that it may have gone over something that its end is not beside.
   Mask goes_far(const Step& step) const {
@@ -111,9 +118,13 @@ class SeriesLooks {
   Mask solves(const Step& step, const L& share) {
     const L tau = share * step.size / step.series.unit();
     see(step.series, tau);
-    systems_.here(fma(share, step.size, step.time), &SystemFunctions::acceleration, seen_[0],
-                  seen_[step.series.coordinates()], found_[0]);
+    find_accelerations(fma(share, step.size, step.time));
     return bends_so(step, tau);
+  }
+
+  /// Those of the motion that was seen.
+  void find_accelerations(const L& time) {
+    systems_.here(time, &SystemFunctions::acceleration, seen_[0], seen_[seen_.rows() / 2], found_[0]);
   }
 
   /// Whether the series bends by the accelerations that were found, but for what terms beyond its order may add, and
@@ -145,18 +156,35 @@ class SeriesLooks {
     return arguments_[static_cast<std::size_t>(look) * systems_.info().argument_is_base.size() + a];
   }
 
-  /// Whether one of them changes much from look to look.
-  Mask arguments_change() {
+  /// How arguments change from look to look. Even: bases of powers change by more, but less than `largest_ratio`, and
+  /// have no place near zero between the looks. What such a power adds is seen from its end or from its middle.
+  struct Change {
+    Mask is_small, is_even;
+  };
+  Change change_of_arguments() {
     const std::span<const bool> is_base = systems_.info().argument_is_base;
-    Mask are_steady(L(0.0) == L(0.0));
-    for (int look = 1; look < 3; ++look) {
-      for (std::size_t a = 0; a < is_base.size(); ++a) {
-        const L here = from_row<L>(argument(look, a)), before = from_row<L>(argument(look - 1, a));
-        const L size = is_base[a] ? min(abs(here), abs(before)) : L(1.0);
-        are_steady = are_steady & (abs(here - before) <= L(FieldLook::much) * size);
+    const Mask yes(L(0.0) == L(0.0));
+    Change change{yes, yes};
+    for (std::size_t a = 0; a < is_base.size(); ++a) {
+      const L begin = from_row<L>(argument(0, a)), middle = from_row<L>(argument(1, a)),
+              end = from_row<L>(argument(2, a));
+      const L low = min(abs(middle), min(abs(begin), abs(end)));
+      const L size = is_base[a] ? low : L(1.0), much = L(FieldLook::much) * size;
+      const Mask is_small = max(abs(middle - begin), abs(end - middle)) <= much;
+      change.is_small = change.is_small & is_small;
+      if (!is_base[a]) {
+        change.is_even = change.is_even & is_small;
+        continue;
       }
+      // The parabola through the looks turns at -slope/bend, in halves of the step from its middle.
+      const L slope = L(0.5) * (end - begin), bend = begin - L(2.0) * middle + end;
+      const L turn = select(abs(slope) < abs(bend), fma(L(-0.5) * slope, slope / bend, middle), middle);
+      const L high = max(max(abs(begin), abs(end)), max(abs(middle), abs(turn)));
+      const Mask has_one_sign = min(min(begin * middle, middle * end), middle * turn) > L(0.0);
+      const Mask stays_away = abs(turn) >= L(0.5) * low, is_within = high <= L(largest_ratio) * low;
+      change.is_even = change.is_even & (is_small | (has_one_sign & stays_away & is_within));
     }
-    return !are_steady;
+    return change;
   }
 
   /// Which of these members solve the equations wherever such functions change fast within the step; others do.
