@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <deque>
 #include <functional>
+#include <limits>
 #include <map>
 #include <optional>
 #include <pendula/chain/chain_numbers.hpp>
@@ -121,7 +122,8 @@ class LaneRuns : private MemberWatch {
       if (!setup.events.empty()) watches_.back().start(setup.start);
       wants_looks_ |= !setup.events.empty();
       if (tracks[k] != nullptr) tracks[k]->begin(setup.start);
-      wants_steps_ |= !setup.events.empty() || is_tried(setup) || tracks[k] != nullptr;
+      most_.push_back(most_steps_of(setup));
+      wants_steps_ |= !setup.events.empty() || is_tried(k) || tracks[k] != nullptr;
     }
     steps_.resize(setups.size());
     takes_too_long_.resize(setups.size());
@@ -164,7 +166,7 @@ class LaneRuns : private MemberWatch {
     report.energy_error = {before.energy, detail::energy_scale(subject, before, after, end.energy_sum), 0};
     const double last = std::abs(after.energy - before.energy);
     report.energy_error.largest = report.energy_error.of(before.energy + std::max(last, end.energy_error));
-    if (is_tried(setup) && !is_good(k, report)) return false;
+    if (is_tried(k) && !is_good(k, report)) return false;
     report.energy_final = after.energy;
     report.options = options_;
     report.rows = 1 + (end.steps + setup.every - 1) / setup.every;
@@ -177,19 +179,23 @@ class LaneRuns : private MemberWatch {
     return true;
   }
 
-  bool is_tried(const RunSetup& setup) const {
-    return options_.method != setup.options.method && detail::has_to_be_tried(*setup.subject);
+  std::int64_t most_steps_of(const RunSetup& setup) const {
+    const bool tried = options_.method != setup.options.method && detail::has_to_be_tried(*setup.subject);
+    if (!tried) return no_limit;
+    return setup.subject->loaded() ? most_unchecked_steps : most_steps;
   }
+  bool is_tried(std::size_t k) const { return most_[k] != no_limit; }
   bool is_good(std::size_t k, const RunReport& report) const {
     const RunSetup& setup = *setups_[k];
     return !takes_too_long_[k] && (setup.subject->loaded() || report.energy_error.largest <= setup.options.tolerance);
   }
   // The number of steps is extrapolated from the share of the run that is done.
   bool takes_too_long(std::size_t k, double time) const {
+    if (steps_[k] >= most_[k]) return true;
+    if (steps_[k] != tried_steps || !is_tried(k)) return false;
     const RunSetup& setup = *setups_[k];
-    const int most = setup.subject->loaded() ? most_unchecked_steps : most_steps;
     const double share = (time - setup.start.time) / setup.duration;
-    return steps_[k] >= most || (steps_[k] == tried_steps && tried_steps > 2 * share * most);
+    return tried_steps > 2 * share * static_cast<double>(most_[k]);
   }
 
   // --- After each step ---
@@ -241,7 +247,7 @@ class LaneRuns : private MemberWatch {
       if (!steps.took_step(lane)) continue;
       const std::size_t k = steps.member(lane);
       ++steps_[k];
-      if (is_tried(*setups_[k]) && takes_too_long(k, steps.end(lane))) {
+      if (takes_too_long(k, steps.end(lane))) {
         takes_too_long_[k] = true;
         steps.finish(lane);
       }
@@ -277,9 +283,10 @@ class LaneRuns : private MemberWatch {
   // Steps that a substituted method may take: few where nothing checks them, more where the energy does. After
   // tried_steps they are extrapolated for the first time.
   static constexpr int most_unchecked_steps = 2000, most_steps = 20000, tried_steps = 200;
+  static constexpr std::int64_t no_limit = std::numeric_limits<std::int64_t>::max();
 
   bool wants_steps_ = false, wants_looks_ = false, stopped_ = false;
-  std::vector<std::int64_t> steps_;  // that each member has taken
+  std::vector<std::int64_t> steps_, most_;  // that each member has taken, and may take
   std::vector<bool> takes_too_long_;
 };
 

@@ -117,9 +117,10 @@ class SeriesExpansion {
   static constexpr Slopes slopes{};
   static constexpr Bends bends{};
 
-  /// Such a sum of all coordinates; of one motion as many at once as a row of its state has.
+  /// Such sums of the numbers of a state from `begin` to `end`; of one motion also of those that share a register with
+  /// them.
   template <class Which>
-  void sum_all(const L& tau, Which which, PackRows<W>& to) const {
+  void sum_all(const L& tau, Which which, PackRows<W>& to, std::size_t begin, std::size_t end) const {
     const auto add = [&]<class Lanes>(const Lanes& at, std::size_t first, std::type_identity<Lanes>) {
       to_row(sum_of(at,
                     [&](std::size_t k) {
@@ -129,8 +130,10 @@ class SeriesExpansion {
                     }),
              to[first]);
     };
-    for_each_part(
-        [&]<class Lanes>(std::size_t first, std::type_identity<Lanes> lanes) { add(Lanes(tau), first, lanes); });
+    for_each_part([&]<class Lanes>(std::size_t first, std::type_identity<Lanes> lanes) {
+      constexpr std::size_t together = is_batch<L> ? 1 : static_cast<std::size_t>(Lanes::size);
+      if (first < end && first + together > begin) add(Lanes(tau), first, lanes);
+    });
   }
 
   /// Calls visit(first, type) for the parts of a row of states that registers hold: of one motion as many numbers as

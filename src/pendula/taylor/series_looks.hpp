@@ -31,7 +31,6 @@ class SeriesLooks {
         largest_defect_(0.25 * series.order() * series.order() * std::max(tolerance, 1e-15)),
         moved_(series.row()),
         turned_(series.row()),
-        bent_(series.row()),
         seen_(2 * series.coordinates()),
         found_(series.coordinates()),
         arguments_(3 * systems.info().argument_is_base.size() + 1) {}
@@ -99,13 +98,14 @@ class SeriesLooks {
 
   /// Finds the motion of the series at a time.
   void see(const Series& series, const L& tau) {
-    series.sum_all(tau, Series::rises, moved_);
+    const std::size_t n = series.coordinates();
+    series.sum_all(tau, Series::rises, moved_, 0, series.has_momenta() ? n : 2 * n);
     see(series, tau, moved_);
   }
   void see(const Series& series, const L& tau, const PackRows<W>& rises) {
     const std::size_t n = series.coordinates();
     const L inverse = L(1.0) / series.unit();
-    if (series.has_momenta()) series.sum_all(tau, Series::slopes, turned_);
+    if (series.has_momenta()) series.sum_all(tau, Series::slopes, turned_, 0, n);
     for (std::size_t i = 0; i < n; ++i) {
       to_row(fma(tau, from_row<L>(rises[i]), series.coefficient(0, i)), seen_[i]);
       to_row(series.has_momenta() ? from_row<L>(turned_[i]) * inverse
@@ -133,13 +133,17 @@ class SeriesLooks {
     const Series& series = step.series;
     const std::size_t n = series.coordinates();
     const L inverse = L(1.0) / series.unit();
-    series.has_momenta() ? series.sum_all(tau, Series::bends, bent_) : series.sum_all(tau, Series::slopes, turned_);
+    if (series.has_momenta()) {
+      series.sum_all(tau, Series::bends, turned_, 0, n);
+    } else {
+      series.sum_all(tau, Series::slopes, turned_, n, 2 * n);
+    }
     L farthest(0.0);
     for (std::size_t i = 0; i < n; ++i) farthest = max(farthest, abs(series.coefficient(0, i)));
     Mask held(L(0.0) == L(0.0));
     for (std::size_t i = 0; i < n; ++i) {
       const L by_series =
-          series.has_momenta() ? from_row<L>(bent_[i]) * (inverse * inverse) : from_row<L>(turned_[n + i]) * inverse;
+          series.has_momenta() ? from_row<L>(turned_[i]) * (inverse * inverse) : from_row<L>(turned_[n + i]) * inverse;
       const L off = step.size * series.unit() * abs(from_row<L>(found_[i]) - by_series);
       const L defect = max(off - L(ErrorSize::rounding) * farthest, L(0.0));
       held = held & (defect * step.reach.rate_scale(i) <= L(largest_defect_));
@@ -211,11 +215,11 @@ class SeriesLooks {
 
   MemberSystems<L>& systems_;
   FieldLook look_;
-  double largest_defect_;              // of accelerations, times h, relative to scales
-  PackRows<W> moved_, turned_, bent_;  // sums of all coordinates
-  PackRows<W> seen_;                   // a motion on the way of the step
-  PackRows<W> found_;                  // accelerations there
-  PackRows<W> arguments_;              // of functions that may be narrow, at three places of the step
+  double largest_defect_;       // of accelerations, times h, relative to scales
+  PackRows<W> moved_, turned_;  // sums of coordinates and rates
+  PackRows<W> seen_;            // a motion on the way of the step
+  PackRows<W> found_;           // accelerations there
+  PackRows<W> arguments_;       // of functions that may be narrow, at three places of the step
 };
 
 }  // namespace pendula

@@ -163,7 +163,7 @@ class SeriesSteps {
     if (!is_expanded_) expand();
     tried_ = h;
     const L unit = series_.unit(), tau = h / unit;
-    series_.sum_all(tau, Series::rises, rises_);
+    series_.sum_all(tau, Series::rises, rises_, 0, 2 * n_);
     series_.for_each_part([&]<class Lanes>(std::size_t k, std::type_identity<Lanes>) {
       const Lanes x = from_row<Lanes>(now_.state[k]),
                   change = fma(Lanes(tau), from_row<Lanes>(rises_[k]), from_row<Lanes>(now_.low[k])),
