@@ -14,7 +14,7 @@ from pendula_codegen.tape import Row, Tape
 
 CONDITIONS = ("parameters", "times", "inputs")  # what functions are taken at, whatever they are taken of
 
-# Of SystemFunctions, what steps of a tape are; and of PlainFunctions.
+# OF_MANY: the functions of SystemFunctions that are written from a tape. PLAIN: those of PlainFunctions.
 OF_MANY = (
     "hamiltonian_form",
     "momentum_form",

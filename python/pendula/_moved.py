@@ -29,7 +29,8 @@ class Moved:
         self.made = self._prepared(system)
         self.varied = Varied(self.made)
         self.size = int(self.made.start.size)
-        # What has no derivatives is told now, and not while another program runs it.
+        # Run once with no directions: a system without derivatives raises its error here, not later, inside JAX or
+        # PyTorch.
         none = np.zeros((self.size, 0)), np.zeros((self.varied.count, 0))
         with plainly():
             _core.forward(self.made, self.made.time, self.made.start, np.zeros(0), *none)

@@ -20,7 +20,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Contents of the file of a resumed run: it has events only if it had them from the beginning.
+/// What the file of a resumed run contains. If the file that it goes on from has no table of events, the new one gets
+/// none.
 RunContents going_on(RunContents contents, const SavedRun& saved) {
   if (saved.checkpoint && !saved.has_events) contents.events.clear();
   return contents;

@@ -143,7 +143,7 @@ class ChainForces {
     for (std::size_t k = 0; k < torque.size(); ++k) torque[k] = torques_[i][k][j];
     std::array<Cell, D> turning;
     Space::Link::torque_load(torque, rod, turning);
-    const auto& drag = spread(constants_[i].drag);
+    const auto& drag = spread(constants_[i].drag);  // damping, λ/l²
     return components<D>([&](std::size_t k) { return Cell(drag * advance[k] - turning[k]); });
   }
 

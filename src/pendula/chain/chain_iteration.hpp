@@ -38,8 +38,8 @@ template <class T>
 ///
 /// Pointers and coefficients that every link needs are members here, so that they stay in registers: otherwise a
 /// compiler must assume that stores to stages change them. Rows are worked on cell by cell, by two cells at a time
-/// where there are several, so that the latency of one hides that of the other. A rod whose row is one cell is placed
-/// where the sweep comes to it.
+/// where there are several, so that the latency of one hides that of the other. With several cells a row, all rods are
+/// placed in a pass of their own, before the sweeps. With one, the sweep places each rod when it reaches it.
 template <class Motion>
 class ChainIteration {
   using Num = typename Motion::Num;

@@ -169,7 +169,7 @@ struct LinkConstants {
   Real inverse_length{1.0}, inverse_square{1.0};     ///< 1/l, 1/l²
   Twofold<Real> inverse_mass{Real(1.0), Real(0.0)};  ///< 1/m
   Real inverse_masses{1.0};  ///< 1/m_i + 1/m_{i−1}, of the bobs at both ends of the rod; 1/m_0 = 0
-  Real drag{0.0};            ///< λ/l²
+  Real drag{0.0};            ///< damping: λ/l²
   Real weight{1.0};          ///< M g, M the mass that the rod carries
   Real hanging{0.0};         ///< M |g|/l, its tension over its length where the chain hangs at rest
 

@@ -44,11 +44,12 @@ void add_transposed_product(const Real (&a)[Rows][Columns], const Row* x, Row* y
 /// chain_elimination.hpp, linearised where they are solved (implicit function theorem), eliminated once along the chain
 /// in O(n), and then applied to any direction in O(n).
 ///
-/// Coordinates of the tangent space are δû_i, of the directions, and δμ_i, of the angular momenta across them,
-///   μ_i = l_i (y_i − (y_i·ξ_i/l_i²) ξ_i),
-/// in components of RodFrame: all δû, link by link  [1], then all δμ  [N m s]. In the plane they are δθ and δp, p =
-/// ∂L/∂θ̇; in space the three components of vectors across û in the axes of the world, so that nothing happens at a pole
-/// (what a seed has along û is left out). The form Σ δû·δμ' − δμ·δû' is kept where nothing damps.
+/// A tangent has, for each link i, the change δû_i of its direction, and the change δμ_i of its angular momentum across
+/// the direction,
+///   μ_i = l_i (y_i − (y_i·ξ_i/l_i²) ξ_i).
+/// First come all δû  [1], link by link, then all δμ  [N m s]. In the plane they are δθ_i and δp_i, p = ∂L/∂θ̇. In
+/// space each is a vector across û in the axes of the world, so that poles need no care; a part along û that a seed has
+/// is left out. The form Σ δû·δμ' − δμ·δû' is kept where nothing damps.
 ///
 /// Parameters are the masses, lengths, dampings of all links, gravity, and then the components of a torque on every
 /// link that is constant through the step, (3n + 1 + torque_components n)  [kg, m, N m s, m/s², N m].

@@ -43,7 +43,8 @@ class StageChange {
  private:
   static Real plus(const Real& x, const Real& y) { return x + y; }
 
-  // Of all stages in halves: what is done first does not wait for all the others.
+  // Combines the stages pairwise, halving their number each time: so operations do not wait for each other in one long
+  // chain.
   template <class Combine>
   static Real over_stages(const L& lanes, Combine combine) {
     alignas(pack_alignment) Real values[L::size];

@@ -30,9 +30,9 @@ RunOptions lane_options(const RunSetup& setup);
 std::vector<RunReport> run_members(
     std::span<const RunSetup> setups, const std::function<bool()>& stop = [] { return false; });
 
-/// The leading Lyapunov exponents of the runs that go in lanes, each over its whole duration; none of the others. Empty
-/// if it was stopped. A member that loses too much energy by a substituted method is moved again by a hundredth of the
-/// tolerance, and then by its own options.
+/// The leading Lyapunov exponent of each run that goes in lanes, over its whole duration; nullopt for any other run.
+/// The vector is empty if `stop` ended the work. A run whose method was chosen, and which loses too much energy, is
+/// repeated with a hundredth of the tolerance (not below a least one), and then with its own options.
 std::vector<std::optional<LyapunovSpectrum>> exponents_in_lanes(
     std::span<const RunSetup> setups, const std::function<bool()>& stop = [] { return false; });
 

@@ -24,9 +24,9 @@ struct CorrectionLimits {
 /// An iteration stops where the *next* correction would be far below round-off, or where it no longer follows its own
 /// rate of convergence, because only rounding is left (Hairer, McLachlan, Razakarivony 2008; arXiv:1702.03354).
 ///
-/// A fixed point on rates and forces is two interleaved sequences: velocities follow from the forces of the iteration
-/// before, and those from the velocities before that. Then corrections are looked at in pairs, and their rate is that
-/// of two iterations.
+/// Where the unknowns are rates and forces, set Sequences = 2: rates follow from the forces of the iteration before,
+/// and forces from its rates, so that two sequences alternate. The size of a correction is then the larger of two
+/// consecutive ones, and the rate of convergence compares sizes two iterations apart.
 template <class Num, int Sequences = 1>
 class FixedPointStop {
  public:

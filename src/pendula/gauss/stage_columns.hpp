@@ -95,8 +95,8 @@ class StageColumns {
     return gain;
   }
 
-  /// Coefficients of the Legendre polynomials on the step, times h, of the polynomial through stage values that hold
-  /// the factor h b.
+  /// x holds stage values, each times h b_j. A polynomial goes through the values themselves. Returns its coefficients
+  /// in Legendre polynomials on the step, times h.
   L legendre(const Real* x) const { return product(legendre_, x); }
 
   /// Bounds of |∫_0^x f| and of |f(x) − f(0)| over the step, both times h, where the polynomial through stage values

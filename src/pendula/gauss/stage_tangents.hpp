@@ -114,7 +114,7 @@ class StageTangents {
     }
   }
 
-  /// Keeps the tangents, and goes back there.
+  /// save() keeps all tangents. restore(which) puts those of these members back.
   void save() {
     for (CoordinateTangent& part : parts_) part.saved = {part.place, part.rate};
   }

@@ -235,7 +235,7 @@ class SystemMembers
     }
   }
 
-  /// Keeps where the members are, and goes back there.
+  /// save() keeps the states of all members. restore(which) puts these members back to them.
   void save() {
     Base::keep(saved_);
     if constexpr (has_tangent) tangent_.save();

@@ -29,8 +29,9 @@ class StepView {
   /// the outcome is ok.
   virtual Outcome at_full_order(double time, Motion& motion) = 0;
 
-  /// Bounds of how far coordinates and rates get, anywhere in the step, from where it began: cheaper than by dense
-  /// output. Returns whether they are known; `farthest` has the right size.
+  /// Sets `farthest` to bounds of how far each coordinate and rate gets from its value at the start of the step, for
+  /// rates of Gauss steps from the stage polynomial's rate there. Cheaper than dense output. False if they are not
+  /// known. The caller gives vectors of the right size.
   virtual bool bound_excursions(Motion& /*farthest*/) const { return false; }
 
   Motion state() const {

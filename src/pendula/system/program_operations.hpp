@@ -9,7 +9,8 @@
 
 namespace pendula {
 
-/// What programs of kernels do with numbers: calls row(name, function).
+/// Calls row(name, function) for each operation on numbers that a kernel's program may have, in the order of their
+/// codes. operation_names has what follows them.
 template <class Row>
 constexpr void program_operations(Row row) {
   using detail::sum_of_product, std::cbrt;
