@@ -26,7 +26,7 @@ inline bool is_estimated(const RunSetup& setup) {
   return setup.doubted && setup.estimate;
 }
 
-/// A track for a run in lanes: of many at once, so at most 256 kB.
+/// A track for a run in lanes, of at most 256 kB, since there are many at once.
 inline Track lane_track() {
   return Track(Track::apart / 2, std::size_t{1} << 15).by_dense_output();
 }
@@ -46,12 +46,12 @@ inline RunOptions in_lanes(RunOptions options, const RunOptions& run) {
   return options;
 }
 
-/// A doubt if another run finds other events, or at other times.
+/// A doubt if another run finds other events, or the same ones at other times.
 inline Doubt of_events(const RunSetup& setup, const SecondLook& look, const RunReport& report, const RunReport& other) {
   for (std::size_t k = 0; k < setup.events.size(); ++k) {
     const EventTally &one = report.events[k], &another = other.events[k];
     const double off = std::abs(one.first - another.first) * look.trusted;
-    const bool is_early = !(off > visible * (one.first - setup.start.time));  // or never
+    const bool is_early = !(off > visible * (one.first - setup.start.time));  // true, too, if it never happened
     if (one.count == another.count && is_early) continue;
     const std::string what = "event " + setup.events[k].name + " happens ";
     if (one.count != another.count) {
@@ -63,8 +63,8 @@ inline Doubt of_events(const RunSetup& setup, const SecondLook& look, const RunR
   return {};
 }
 
-/// Tracks of runs in lanes are dense output, whose errors are larger than those of steps: they only tell whether the
-/// motion has gone elsewhere on the way. The ends are compared exactly.
+/// A doubt by the distance from another run. Tracks of runs in lanes are dense output, whose errors are larger than
+/// those of steps: they only show whether the motions have parted on the way. The ends are compared exactly.
 inline Doubt of_other(const Doubted& member, const SecondLook& look, const RunReport& other, const Track& track) {
   static constexpr double elsewhere = 0.5;
   const Separation parted(*member.setup.subject, member.track, track);
@@ -73,7 +73,7 @@ inline Doubt of_other(const Doubted& member, const SecondLook& look, const RunRe
   return doubt ? doubt : of_events(member.setup, look, member.report, other);
 }
 
-/// If no other run goes in lanes: the member is run alone, with a second look, and its end is compared.
+/// A doubt where no other run goes in lanes: the member is run alone, with a second look, and its end is compared.
 inline Doubt of_run_alone(const Doubted& member, const std::function<bool()>& stop) {
   const RunSetup& setup = member.setup;
   const RunReport alone = Run(setup).go(stop);
@@ -87,7 +87,7 @@ inline Doubt of_run_alone(const Doubted& member, const std::function<bool()>& st
   return of_events(setup, {setup.options, "alone, not in lanes,", 1, 1}, member.report, alone);
 }
 
-/// Looks at members again, each by the run that choose(member) gives; if it gives none, the doubt stays as it is.
+/// Looks at members again, each by the run that choose(member) returns; if it returns none, the doubt does not change.
 template <class Choose>
 void look_by(std::span<Doubted* const> members, Choose choose, const std::function<bool()>& stop) {
   std::vector<Doubted*> looked;
@@ -95,7 +95,7 @@ void look_by(std::span<Doubted* const> members, Choose choose, const std::functi
   std::vector<RunSetup> setups;
   std::vector<Track> tracks;
   RunsByKind kinds;
-  std::vector<std::size_t> others;  // that do not go in lanes
+  std::vector<std::size_t> others;  // runs that do not go in lanes
   for (Doubted* const member : members) {
     const RunOptions& run = member->report.options;
     std::optional<SecondLook> look = choose(*member);
@@ -135,7 +135,8 @@ void look_by(std::span<Doubted* const> members, Choose choose, const std::functi
   }
 }
 
-/// As Run does: first by a coarser run, which takes less time; if that doubts a member, by a finer one.
+/// Looks at members again as Run does: by a coarser run, which takes less time, and if that leaves a doubt, by a finer
+/// one.
 inline void look_again(std::vector<Doubted>& members, const std::function<bool()>& stop) {
   std::vector<Doubted*> left;
   left.reserve(members.size());
