@@ -298,7 +298,7 @@ def _request(options: argparse.Namespace, laws: list[SampledLaw]) -> Request:
 
 
 def _export_words(options: argparse.Namespace) -> str:
-    """What an export was asked for, besides of what and where."""
+    """The options of an export, besides what is exported and where to."""
     words = [
         f"--as {options.language} --name {options.name} --stages {options.stages} --number {options.number}"
     ]
@@ -316,7 +316,7 @@ def _export_words(options: argparse.Namespace) -> str:
 
 
 def _require_own(path: Path) -> None:
-    """Only what was generated is written over."""
+    """Raises GenerationError if the path has something that was not generated: that is not overwritten."""
     if path.is_dir() or (path.exists() and MARK not in path.read_bytes()):
         raise GenerationError(f"export: expected a new file, or one that was exported before, got {path}")
 

@@ -1,4 +1,4 @@
-"""What a function of CasADi's external interface takes and gives."""
+"""Arguments and results of a function in CasADi's external interface."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def shapes(sides: Sequence[Side]) -> str:
 
 
 def slopes_of(out: Side, ins: Sequence[Side], without: Sequence[str]) -> list[Side]:
-    """The derivatives of a result by each argument; by those of `without` it has none."""
+    """The derivatives of a result with respect to each argument; zero for those in `without`."""
     return [
         Side(f"D{out.name}D{given.name}", out.rows, given.rows, place, given.name in without)
         for place, given in enumerate(ins)

@@ -1,6 +1,7 @@
-"""Points to compare a kernel at with what its model says, and what it says there: numbers that `pendula check` reads.
+"""Points at which `pendula check` compares a kernel with its model, and the model's values there.
 
-Points are drawn about a start, and aimed at: a pulse that lasts for a millisecond is nothing at a time drawn at random.
+Points are drawn about a start. Others are aimed at places where functions change: a random time hardly meets a pulse
+of a millisecond.
 """
 
 from __future__ import annotations
@@ -24,7 +25,7 @@ Numbers = dict[Symbol, float]
 
 @dataclass(frozen=True)
 class Start:
-    """About where points are drawn; parameters in the order of the kernel, accelerations are drawn."""
+    """Points are drawn about this state. Parameters are in the order of the kernel; accelerations are random."""
 
     parameters: Sequence[float]
     time: float
@@ -35,8 +36,8 @@ class Start:
 def comparison(model: Model, start: Start, seed: int) -> str:
     """In one line: how many points; of each the time, q, v, a, parameters, inputs, and values with their errors.
 
-    An error is what a value may be off by, were each operation of the model rounded once. Where there is no value that
-    a double can hold, both are nan.
+    An error is the rounding error of a value if each operation of the model is rounded once. Both are nan if there is
+    no value that a double can hold.
     """
     functions, symbols = written(model), _Symbols(model)
     found = points(model, start, seed)
@@ -71,7 +72,7 @@ class _Symbols:
 
 
 def points(model: Model, start: Start, seed: int) -> list[Numbers]:
-    """Where the Lagrangian and the forces are numbers."""
+    """Points at which the Lagrangian and the forces have values."""
     draw, symbols = random.Random(seed), _Symbols(model)
     said = [model.lagrangian, *(model.force_along(q) for q in symbols.q)]
     found: list[Numbers] = []
@@ -87,7 +88,7 @@ def points(model: Model, start: Start, seed: int) -> list[Numbers]:
         return True
 
     for k in range(DRAWN):
-        # Nearer to the start where there is nothing further away.
+        # Nearer to the start if there are no values further away.
         any(keep(_drawn(model, symbols, start, draw, k, 0.5**attempt)) for attempt in range(20))
     aims = list(_aims(said, symbols))
     draw.shuffle(aims)
@@ -103,7 +104,7 @@ def points(model: Model, start: Start, seed: int) -> list[Numbers]:
 def _drawn(
     model: Model, symbols: _Symbols, start: Start, draw: random.Random, number: int, spread: float
 ) -> Numbers:
-    """Every other point has the parameters of the start; two of four have its time."""
+    """A random point. Every other one has the parameters of the start; two of four have its time."""
 
     def some(size: float) -> float:
         return draw.choice((-1, 1)) * size * 10 ** draw.uniform(-1.5, 0.5)
@@ -125,7 +126,7 @@ def _drawn(
 
 @dataclass(frozen=True)
 class _Aim:
-    """A symbol is to be such that an expression, which holds it, is near zero."""
+    """A symbol is to be chosen so that an expression that contains it is near zero."""
 
     expression: Expr
     symbol: Symbol
@@ -133,7 +134,7 @@ class _Aim:
 
 
 def _aims(said: Iterable[Expr], symbols: _Symbols) -> Iterator[_Aim]:
-    """Where functions change most, and sums in them or in denominators and roots vanish."""
+    """Aims at places where functions change most: where their arguments, denominators and radicands vanish."""
     seen: set[_Aim] = set()
     for part in sorted({part for expression in said for part in expression.atoms(Function, Pow)}, key=str):
         inside = part.args[0]
@@ -148,7 +149,7 @@ def _aims(said: Iterable[Expr], symbols: _Symbols) -> Iterator[_Aim]:
 
 
 def _hit(aim: _Aim, numbers: Mapping[Symbol, float], draw: random.Random) -> float | None:
-    """The value of the symbol; None where none was found."""
+    """The value of the symbol; None if none was found."""
     target = 0 if aim.exactly else draw.uniform(-1.5, 1)
     others = {symbol: value for symbol, value in numbers.items() if symbol != aim.symbol}
     offset = aim.expression.xreplace(others) - target

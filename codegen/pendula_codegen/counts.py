@@ -1,4 +1,4 @@
-"""Operation counts of generated kernels, as a table that is kept."""
+"""Operation counts of generated kernels, as a table that is committed."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def count_table(headers: Mapping[str, Header]) -> Table:
 
 
 def as_json(table: Table) -> str:
-    """One line a function, so that a change shows what became longer."""
+    """One line for each function, so that a diff shows what became longer."""
     blocks = [
         f"  {json.dumps(header)}: {{\n"
         + ",\n".join(f"    {json.dumps(name)}: {json.dumps(counts)}" for name, counts in functions.items())

@@ -1,4 +1,4 @@
-"""What a model has, for people and programs who are to set it in motion: names, units, defaults."""
+"""The description of a model for people and programs that run it: names, units, defaults."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ _REMARK = re.compile(r'model\.\w+\(\s*f?"([A-Za-z]\w*?)(?:_\{.*?\})?".*#\s*(.+)$
 
 
 def describe(file: Path, links: int | None = None) -> dict[str, object]:
-    """The model as JSON has it; `default` is null where the scenario has to give the number. Raises GenerationError."""
+    """The model as JSON; `default` is null if the scenario must give the number. Raises GenerationError."""
     model = read_model(file, links)
     text = file.read_text(encoding="utf-8")
     remarks = _remarks(text)
@@ -71,7 +71,7 @@ def describe(file: Path, links: int | None = None) -> dict[str, object]:
 
 
 def describe_all() -> list[dict[str, object]]:
-    """All built-in models, of one link where they have some."""
+    """All built-in models, those with links with one link."""
     return [describe(FOLDER / f"{name}.py") for name in model_names()]
 
 
@@ -80,7 +80,7 @@ def _has_links(model: Model) -> bool:
 
 
 def _about(text: str) -> str:
-    """The first line of what the file says of itself, or else of what `define` says of itself."""
+    """The first line of the docstring of the file, or else of that of `define`."""
     module = ast.parse(text)
     defined = [part for part in module.body if isinstance(part, ast.FunctionDef) and part.name == "define"]
     said = filter(None, map(ast.get_docstring, [module, *defined]))
@@ -88,6 +88,6 @@ def _about(text: str) -> str:
 
 
 def _remarks(text: str) -> dict[str, str]:
-    """Comments on the lines that declare names; a name with the number of a link is that without it."""
+    """Comments on the lines that declare names, by name without the number of a link."""
     found = filter(None, map(_REMARK.search, text.splitlines()))
     return {match[1]: match[2] for match in found}

@@ -7,8 +7,9 @@ from mpmath import mp, mpf
 from sympy import Expr, Float, Mul, Rational, exp
 
 MOST_DENOMINATOR = 64  # of an exponent that is a root
-# Logarithms of numbers in front of an exponential: those that stay there, and those that nobody has written there. How
-# exactly SymPy knows a number that it has taken out of an exponent.
+# For a number in front of an exponential, with logarithm x. |x| < SMALL: it stays. |x| >= LARGE: nobody wrote it so,
+# and it goes back into the exponent. Between: it goes back only if x is a double to within ROUNDING, for then SymPy
+# took it out of the exponent.
 SMALL, LARGE, ROUNDING = 8, 230, 2.3e-16
 
 

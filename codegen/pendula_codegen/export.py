@@ -1,6 +1,6 @@
 """A system for other people's programs: its functions, their derivatives and a Gauss step, in plain C99.
 
-Which functions there are is said here; backends/c99.py writes their bodies, templates/export.c.j2 the step.
+This file lists the functions; backends/c99.py writes their bodies, templates/export.c.j2 the step.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from pendula_codegen.render import ENVIRONMENT, banner
 from pendula_codegen.tableau import MAX_STAGES, gauss
 from pendula_codegen.tape import Row, Tape, Value
 
-# Templates of a language, and what files are called after the name.
+# Templates of a language, and the ending of their files after the name.
 _C = {"export.h.j2": ".h", "export.c.j2": ".c"}
 LANGUAGES = {
     "c": _C,
@@ -37,13 +37,13 @@ LANGUAGES = {
 EPSILON, FLOAT_EPSILON = 2.0**-52, 2.0**-23
 MOST_COORDINATES = 16  # everything is written out, and matrices are dense
 
-# What a function is made of: entry points of the kernel, and what it calls what they give.
+# The parts of a function: entry points of the kernel, and the names and meanings of their results.
 Parts = dict[str, tuple[tuple[str, str], ...]]
 
 
 @dataclass(frozen=True)
 class _Said:
-    """A function of the state: its title, arrays that it takes, what it is made of, and whether inputs matter to it."""
+    """A function of the state: its title, the arrays that it takes, its parts, and whether it depends on inputs."""
 
     title: str
     takes: tuple[str, ...]
@@ -100,7 +100,7 @@ _DIFFERENTIATED = ("momentum_form", "residual")  # by the kernel itself, in fewe
 
 @dataclass(frozen=True)
 class Array:
-    """What a function gives: `rows` times `columns` numbers, row by row."""
+    """A result of a function: `rows` times `columns` numbers, row by row."""
 
     name: str
     meaning: str
@@ -118,7 +118,7 @@ class Array:
 
 @dataclass(frozen=True)
 class ExportedFunction:
-    """A function as a tape. Parameters, time and inputs come before what it takes."""
+    """A function as a tape. Parameters, time and inputs come before its own arguments."""
 
     name: str
     title: str
@@ -128,7 +128,7 @@ class ExportedFunction:
 
 
 class ExportedFunctions:
-    """The functions of a kernel, each alone, with its Jacobians by the state, and those by inputs and parameters."""
+    """The functions of a kernel, each alone, with its Jacobians w.r.t. the state, and w.r.t. inputs and parameters."""
 
     def __init__(self, kernel: SystemKernel):
         declared = kernel.declared
@@ -179,7 +179,7 @@ class ExportedFunctions:
         return any(step.row == _TIME for tape in tapes for step in tape.steps)
 
     def _recorded(self, name: str, parts: Parts) -> tuple[Tape, dict[Row, Value], list[Array]]:
-        """Values on a tape, and the arrays that they are."""
+        """A tape, its values by row, and the arrays that these rows belong to."""
         tape, found, arrays = Tape(), {}, []
         for entry, called in parts.items():
             function = self._recorder.functions[entry]
@@ -232,7 +232,7 @@ class ExportedFunctions:
     def _jacobians(
         self, tape: Tape, found: dict[Row, Value], arrays: Sequence[Array], by: str
     ) -> list[Array]:
-        """Adds what the derivatives of arrays are to `found`."""
+        """Adds the derivatives of arrays to `found`."""
         size, steps = self.sizes[by], [*tape.steps]
         one, zero = tape.number(1.0), tape.number(0.0)
         for column in range(size):
@@ -251,7 +251,7 @@ def _slope(of: str, by: str) -> str:
 
 @dataclass(frozen=True)
 class Values:
-    """Numbers that a program may begin with: all parameters, inputs, the state (q, v), the time; how long a run is."""
+    """Numbers for the start of a program: all parameters, inputs, the state (q, v), the time; and the duration."""
 
     parameters: Sequence[float] | None = None
     inputs: Sequence[float] | None = None
@@ -264,9 +264,9 @@ class Values:
 
 @dataclass(frozen=True)
 class Request:
-    """What is asked for.
+    """The request of a user.
 
-    name     what all names of the C begin with
+    name     the prefix of all names in C
     language one of LANGUAGES
     number   double or float
     stages   of the Gauss step
@@ -299,7 +299,7 @@ class Request:
 
 
 def require_size(coordinates: int) -> None:
-    """Raises GenerationError where there are too many."""
+    """Raises GenerationError if there are too many coordinates."""
     if coordinates > MOST_COORDINATES:
         raise GenerationError(
             f"export: expected at most {MOST_COORDINATES} coordinates, got {coordinates}: everything is written out"
@@ -317,7 +317,7 @@ def _require_smooth(switches: Sequence[str]) -> None:
 def render_export(
     kernel: SystemKernel, request: Request, command: str, space: str | None = None, file: Path | None = None
 ) -> dict[str, str]:
-    """Names of files and their text; `command` makes them again, of a chain's space or a model's file.
+    """Names of files and their text; `command`, in their banner, makes them again.
 
     Raises GenerationError.
     """
@@ -409,7 +409,7 @@ def _printed(printer: C99Printer, function: ExportedFunction) -> _Printed:
 
 
 def numbers_of(declared: Declared, values: Values) -> dict[str, list[float | None]]:
-    """Those of the request; else defaults, 1 where a parameter has none and must be positive."""
+    """The numbers of the request; else defaults, or 1 for a parameter without a default that must be positive."""
     defaults = [
         parameter.default if parameter.default is not None else 1.0 if parameter.positive else None
         for parameter in declared.parameters

@@ -10,9 +10,9 @@ from pendula_codegen.tape import Row, Step, Tape, Value, triangle
 def slopes(
     tape: Tape, direction: Callable[[Row], Value | None], steps: Sequence[Step] | None = None
 ) -> dict[Value, Value]:
-    """The derivative of each value that changes where rows that are read do; direction(row) says how fast.
+    """The derivative of each value that depends on rows with a direction; direction(row) is the derivative of a row.
 
-    steps   of these alone; else of all that the tape has
+    steps   only of these; else of all steps of the tape
     """
     found = _Slopes(tape, direction)
     for step in [*tape.steps] if steps is None else steps:
@@ -43,7 +43,7 @@ class _Slopes:
         if slope is not None:
             self.of[value] = slope
 
-    # --- sums of slopes of which there may be none
+    # --- sums of slopes, where None stands for 0
 
     def _plus(self, x: Value | None, y: Value | None) -> Value | None:
         return y if x is None else x if y is None else self.tape.add(x, y)
@@ -86,7 +86,7 @@ class _Slopes:
         self._set(cosine, self.tape.negative(self._times(sine, slope)))
 
     def _solve(self, step: Step) -> None:
-        """M x = b: the slope of x is that of what solves M x' = b' − M' x, with the same factors."""
+        """For M x = b, the slope x' solves M x' = b' − M' x, with the same factors."""
         entries = triangle(step.count)
         factors, b = step.operands[:entries], step.operands[entries:]
         matrix = self._matrices[factors[0]]

@@ -12,14 +12,14 @@ from pendula_codegen.places import Place
 from pendula_codegen.program import Program
 from pendula_codegen.tape import Row, Solved, Tape, Value
 
-Strides = Mapping[str, tuple[int, int]]  # of arrays of two indices: how far apart their numbers stand
+Strides = Mapping[str, tuple[int, int]]  # strides of arrays with two indices
 
 
 class Recorder:
     """Records functions of a kernel.
 
-    functions   all that the kernel has, by name
-    names       what people call what is read
+    functions   all functions of the kernel, by name
+    names       the model's names of rows that are read
     """
 
     def __init__(self, kernel: SystemKernel):
@@ -32,7 +32,7 @@ class Recorder:
         self.names = {self.row(leaf.place): leaf.symbol.name for leaf in leaves}
 
     def record(self, tape: Tape, function: Function) -> dict[Row, Value]:
-        """Adds the steps of a function; its results by where they belong."""
+        """Adds the steps of a function. Returns its results by row."""
         solve = function.solve
         solved = None if solve is None else Solved(solve.solution.name, len(solve.unknowns))
         strides = {
@@ -45,7 +45,7 @@ class Recorder:
         return tape.record(self._programs[function.name], lambda place: self.row(place, strides), solved)
 
     def row(self, place: Place, strides: Strides | None = None) -> Row:
-        """Where the number of a place stands."""
+        """The row of a place."""
         if place.field == "time":
             return "times", 0
         if place.field:

@@ -1,4 +1,4 @@
-"""What the runtime knows of a kernel, in the order of pendula/system/system_table.hpp: functions of rows of numbers."""
+"""The functions of a kernel that the runtime calls, in the order of pendula/system/system_table.hpp."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from pendula_codegen.recording import Recorder
 from pendula_codegen.series_tape import SeriesTapes, series_tapes
 from pendula_codegen.tape import Row, Tape
 
-CONDITIONS = ("parameters", "times", "inputs")  # what functions are taken at, whatever they are taken of
+CONDITIONS = ("parameters", "times", "inputs")  # arguments of all functions
 
-# Of SystemFunctions, what steps of a tape are; and of PlainFunctions.
+# OF_MANY: the functions of SystemFunctions that are written from a tape. PLAIN: those of PlainFunctions.
 OF_MANY = (
     "hamiltonian_form",
     "momentum_form",
@@ -47,13 +47,13 @@ class TableFunction:
 
 @dataclass(frozen=True)
 class KernelTable:
-    """The functions of a model; those that it has not, such as those of points, are none.
+    """The functions of a model; None for those that it lacks, such as those of points.
 
-    of_many   as OF_MANY has them
-    plain     as PLAIN has them
+    of_many   in the order of OF_MANY
+    plain     in the order of PLAIN
     series    Taylor series of motions
-    names     what people call what is read
-    rows      how many rows arrays have that functions take
+    names     the model's names of rows that are read
+    rows      number of rows of each array that functions take
     """
 
     of_many: list[TableFunction | None]
@@ -63,7 +63,7 @@ class KernelTable:
     rows: Mapping[str, int]
 
     def operations(self) -> set[str]:
-        """Those that any function takes."""
+        """All operations that the functions use."""
         functions = filter(None, (*self.of_many, *self.plain))
         tapes = [self.series.start, self.series.next, *(function.tape for function in functions)]
         return {step.operation for tape in tapes for step in tape.steps}
@@ -125,7 +125,7 @@ class _Tables:
         return TableFunction("energies", ("q", "v"), ("kinetic", "total"), tape.give(found))
 
     def _momentum_form_along(self) -> TableFunction:
-        """Slopes alone."""
+        """The slopes only, without the values."""
         whole, gives = _along(self._one("momentum_form"), ("parameters", "inputs")), ("dp", "df")
         outputs = {row: value for row, value in whole.tape.outputs.items() if row[0] in gives}
         takes = ("d_parameters", "d_inputs", "q", "v")
@@ -133,7 +133,7 @@ class _Tables:
 
 
 def series_functions(tapes: SeriesTapes) -> tuple[TableFunction, TableFunction]:
-    """The tapes of a kernel's series as functions; what they take besides the conditions is said there."""
+    """The tapes of a kernel's series as functions; series_tape.py describes their arrays."""
     return (
         TableFunction("series_start", ("unit", "state"), ("next", "kept"), tapes.start),
         TableFunction("series_next", ("order", "state", "kept", "sums"), ("next", "operands"), tapes.next),
@@ -141,12 +141,12 @@ def series_functions(tapes: SeriesTapes) -> tuple[TableFunction, TableFunction]:
 
 
 def _slope_of(array: str) -> str:
-    """How fast an array changes, as an array: dq, d_state."""
+    """The name of the derivative of an array: dq, d_state."""
     return f"d{array}" if len(array) == 1 else f"d_{array}"
 
 
 def _along(function: TableFunction, moved: tuple[str, ...]) -> TableFunction:
-    """A function, and its derivative where some arrays change."""
+    """A function and its derivative along a direction of the arrays `moved`."""
     tape = Tape()
     place = tape.repeat(function.tape)
     slope = slopes(tape, lambda row: tape.read((_slope_of(row[0]), row[1])) if row[0] in moved else None)

@@ -1,7 +1,7 @@
-"""What a model says, as it is written: values in 50 digits, and how much of them a double can have.
+"""Values of a model's own expressions in 50 digits, and their rounding errors in doubles.
 
-Nothing here is shortened or multiplied out: SymPy differentiates the Lagrangian that the file gave, and every operation
-of the result is carried out as it stands. Kernels are compared with this.
+Nothing here is shortened or multiplied out: SymPy differentiates the Lagrangian of the file, and every operation of the
+result is carried out as written. Kernels are compared with these values.
 """
 
 from __future__ import annotations
@@ -17,14 +17,14 @@ from sympy import Add, Expr, Integer, Rational, Symbol, acos, asin, cos, log, si
 from pendula_codegen.model import Model
 
 DIGITS = 50
-LARGEST = mpf(10) ** 300  # of what doubles are trusted with
-KNOWN = 2**48  # error of a number, relative to what changes a function, of which a double has digits
-SMALLEST = mpf(2) ** -1021  # an error of what is too small for a double, in units of its last digit
+LARGEST = mpf(10) ** 300  # larger numbers are not trusted to doubles
+KNOWN = 2**48  # largest relative error of an argument, in units of 2⁻⁵³, for which a function has digits
+SMALLEST = mpf(2) ** -1021  # absolute error of numbers too small for a double, in units of 2⁻⁵³
 
 
 @dataclass(frozen=True)
 class Written:
-    """The functions of a model, derived from what its file says by SymPy alone; matrices row by row."""
+    """The functions of a model, derived from its file by SymPy only; matrices row by row."""
 
     kinetic_energy: list[Expr]
     energy: list[Expr]
@@ -95,15 +95,15 @@ def _jacobian(values: Sequence[Expr], symbols: Sequence[Symbol]) -> list[Expr]:
 
 
 class NotInRangeError(Exception):
-    """Something in an expression is no finite real number, or none that a double can hold."""
+    """A part of an expression is not a finite real number, or does not fit into a double."""
 
 
 @dataclass(frozen=True)
 class Measured:
-    """A value, and what an evaluation in doubles makes of it.
+    """A value, and the rounding error of its evaluation in doubles.
 
-    size    largest value that it could have, were terms with sines and cosines of angles multiplied out
-    error   of an evaluation, in units of half a unit in the last place of 1, 2⁻⁵³
+    size    largest value of the terms if those with sines and cosines of angles are multiplied out
+    error   rounding error, in units of 2⁻⁵³
     """
 
     value: mpf
@@ -112,7 +112,7 @@ class Measured:
 
 
 class Evaluator:
-    """Values of expressions where symbols have the given values, every part once."""
+    """Evaluates expressions at given values of symbols, each part once."""
 
     def __init__(self, numbers: Mapping[Symbol, float], angles: Sequence[Symbol] = ()):
         self._numbers = {symbol: mpf(number) for symbol, number in numbers.items()}
@@ -208,7 +208,7 @@ class Evaluator:
         return value, abs(value), error
 
     def _of_angles(self, argument: Expr, is_sine: bool) -> mpf:
-        """What sines of sums of angles lose, which are computed from those of the angles."""
+        """The error of sines of sums of angles that are computed from those of the angles."""
         counts = argument.as_coefficients_dict()
         total = sum(abs(count) for count in counts.values())
         if not set(counts) <= self._angles or not total.is_Integer or total < 2:

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
 
 def __getattr__(name: str) -> object:
-    """Imports what reads functions when it is asked for."""
+    """Imports ModelFunction and model when they are first used."""
     if name not in ("ModelFunction", "model"):
         raise AttributeError(f"module 'pendula' has no attribute {name!r}")
     from . import _functions
@@ -40,7 +40,7 @@ def __getattr__(name: str) -> object:
 
 
 def __dir__() -> list[str]:
-    """What is public."""
+    """The public names."""
     return [*__all__, "map"]
 
 

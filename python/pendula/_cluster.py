@@ -20,12 +20,12 @@ if TYPE_CHECKING:
 
 
 class Work(NamedTuple):
-    """What a worker makes an ensemble of."""
+    """The data from which a worker makes an ensemble."""
 
     text: str
     name: str
     overrides: tuple[str, ...]
-    model: str  # text of the model's file; empty where there is none
+    model: str  # text of the model's file; empty if there is none
     program: tuple[str, str]  # version and instruction set, which decide the last bits
 
     @classmethod
@@ -39,7 +39,7 @@ class Work(NamedTuple):
                 "(PENDULA_ARCH=avx2 in the environment of all holds them to what each of them can)"
             )
         overrides = list(self.overrides)
-        if self.model:  # the file may not be there
+        if self.model:  # the worker may not have the file
             overrides.append(f'system.model="{kept_model("model", self.model)}"')
         with plainly():
             return _core.Ensemble(self.text, self.name, overrides, "", *places(), tell)
@@ -61,7 +61,7 @@ def _move(work: Work, chunk: int) -> Chunk:
 
 
 def move(made: _core.Ensemble, work: Work, client: Any, shown: Callable[[int], None] | None) -> None:
-    """Has the workers of a cluster move all members. What a worker that dies had is moved again by others."""
+    """Lets the workers of a cluster move all members. Chunks of a worker that dies are moved again by others."""
     try:
         distributed = importlib.import_module("distributed")
     except ImportError as error:
@@ -69,7 +69,7 @@ def move(made: _core.Ensemble, work: Work, client: Any, shown: Callable[[int], N
     if not hasattr(client, "submit") or getattr(client, "asynchronous", False):
         kind = "an asynchronous one" if hasattr(client, "submit") else type(client).__name__
         raise InputError(f"client: expected a Client of dask.distributed that waits, got {kind}")
-    # A task of its own, so that the scheduler can make it again where the workers that had it are gone.
+    # The work is a task of its own, so that the scheduler can make it again if the workers that had it are gone.
     known = client.submit(Work, *work, pure=False)
     futures = {client.submit(_move, known, k, pure=False): k for k in range(made.chunks)}
     done = 0

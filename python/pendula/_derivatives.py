@@ -1,4 +1,4 @@
-"""What motions depend on: derivatives by the start, by parameters and by inputs."""
+"""Derivatives of motions with respect to the start, parameters and inputs."""
 
 from __future__ import annotations
 
@@ -22,20 +22,20 @@ if TYPE_CHECKING:
 
 
 class Derivatives(NamedTuple):
-    """A motion, and its derivatives: exactly those of its steps, whose sizes are held.
+    """A motion, and the exact derivatives of its discrete steps; step sizes are held fixed.
 
-    What ends at an event ends at another time from another start: the last row is differentiated along with that time,
-    which depends on the start as the field tells there, to the accuracy of the steps.
+    The time of an event that ends the motion depends on the start, by the equations of motion there, to the accuracy of
+    the steps. The derivatives of the last row include that of its time.
     """
 
     t: NDArray[np.float64]  #: (rows,) times, in s
     y: NDArray[np.float64]  #: (coordinates + rates, rows), in the order of ``names``
     names: list[str]  #: what the rows of ``y`` are
     by_start: NDArray[np.float64]  #: (rows, coordinates + rates, coordinates + rates)
-    by_parameters: dict[str, NDArray[np.float64]]  #: (rows, coordinates + rates, numbers of it), by name
+    by_parameters: dict[str, NDArray[np.float64]]  #: by name: (rows, coordinates + rates, numbers of it)
     by_inputs: dict[str, NDArray[np.float64]]  #: the same; inputs are varied by constants
     time_by_start: NDArray[np.float64]  #: (coordinates + rates,) of the last time; zeros without an event
-    time_by_parameters: dict[str, NDArray[np.float64]]  #: (numbers of it,)
+    time_by_parameters: dict[str, NDArray[np.float64]]  #: by name: (numbers of it,)
     time_by_inputs: dict[str, NDArray[np.float64]]  #: the same
 
 
@@ -51,7 +51,7 @@ def differentiate(
     step: float | None = None,
     **options: object,
 ) -> Derivatives:
-    """Moves a system, and differentiates where it comes by where it starts, its parameters and its inputs.
+    """Moves a system, and differentiates its motion with respect to the start, parameters and inputs.
 
     Parameters
     ----------
@@ -61,13 +61,13 @@ def differentiate(
     t : array_like, optional
         Times of the rows, in s, from 0 on, at which steps end; if left out, the duration alone.
     start : mapping, optional
-        As for :meth:`Chain.simulate`, as keyword arguments, too. Coordinates and rates are what is held where
-        parameters vary, also where momenta are given.
+        As for :meth:`Chain.simulate`, as keyword arguments, too. Where parameters vary, coordinates and rates of the
+        start are held fixed, even if momenta are given.
     until : str, optional
         An expression of ``t``, coordinates, rates and points that does not jump. The last row is where it first crosses
         zero.
     direction : {"both", "up", "down"}
-        How it crosses zero.
+        The direction in which it crosses zero.
     tolerance, step : float, optional
         As for :class:`Simulation`.
     method, stages, solver, iteration
@@ -155,7 +155,7 @@ def linearize(
     outputs: Outputs | None = None,
     **starts: object,
 ) -> LinearSystem:
-    """The linear system beside a state, exactly.
+    """The exact linearisation at a state.
 
     Parameters
     ----------
@@ -167,13 +167,13 @@ def linearize(
     tolerance : float, optional
         Of the steps inside one, as for :class:`Simulation`.
     outputs : sequence of str or mapping, optional
-        What is measured: columns of a row or expressions of them, ``["x_2", "theta_2 - theta_1"]``, or these by name,
-        ``{"bend": "theta_2 - theta_1"}``. Left out, all points.
+        The measured quantities: columns of a row or expressions of them, ``["x_2", "theta_2 - theta_1"]``, or these by
+        name, ``{"bend": "theta_2 - theta_1"}``. By default all points.
 
     Returns
     -------
     LinearSystem
-        Of deviations from the state: ``A, B = pendula.linearize(…)``, with C and D, frequencies and damping besides.
+        For deviations from the state: ``A, B = pendula.linearize(…)``. It also has C and D, frequencies and damping.
 
     Raises
     ------
@@ -218,7 +218,7 @@ def _times(duration: object, t: ArrayLike | None, made: _core.Prepared) -> NDArr
 def _slopes(
     made: _core.Prepared, until: object, time: float, state: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """The gradient of an expression, by the time and by the state. Raises InputError."""
+    """The derivatives of an expression with respect to time and state. Raises InputError."""
     if not isinstance(until, str):
         raise InputError(f"until: expected an expression, got {type(until).__name__}")
     try:
@@ -230,7 +230,7 @@ def _slopes(
 def _at_event(
     made: _core.Prepared, until: str, time: float, state: NDArray[np.float64], by_all: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """The derivative of the time of an event; adds what it makes of the state there.
+    """The derivative of the time of an event; adds its effect to the derivatives of the state there.
 
     With g the expression, f the field and Phi the derivative at that time: dt = -(g_x Phi) / (g_x f + g_t).
     """

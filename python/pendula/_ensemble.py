@@ -46,7 +46,7 @@ def ensemble(
     progress: bool = False,
     **options: object,
 ) -> xarray.Dataset:
-    """Moves many motions of one system at once, as ``pendula ensemble`` does, to the bit.
+    """Moves many motions of one system at once. Results equal those of ``pendula ensemble`` to the last bit.
 
     Parameters
     ----------
@@ -54,15 +54,15 @@ def ensemble(
     duration : float, optional
         In s; left out, the last of the times ``t``.
     t : array_like, optional
-        Times of rows, in s: with them the dataset has what ``keep`` names of every member over ``t``. Members are moved
-        one by one, as :meth:`Chain.simulate` moves them, into memory: without ``file``, ``shard`` and ``client``.
+        Times of rows, in s. With them the dataset has the columns in ``keep`` of every member over ``t``. Members are
+        then moved one by one, as by :meth:`Chain.simulate`, into memory: without ``file``, ``shard`` and ``client``.
     start : mapping, optional
         Coordinates and rates (or momenta, ``p_theta``) by name, in rad, m and their rates, as keyword arguments, too.
         What is left out is 0.
 
-        A number, or a text such as ``"90 deg"``: that of all members; of several links also (links,). An array lists
-        members: (members,), of several links (members, links). A tuple has a number or an axis of a grid for each link:
-        ``{"theta": (grid_1, grid_2)}`` is the outer product of two vectors.
+        A number, or a text such as ``"90 deg"``, holds for all members; for several links also an array (links,).
+        Other arrays have one entry for each member: (members,), for several links (members, links). A tuple has a
+        number or an axis of a grid for each link: ``{"theta": (grid_1, grid_2)}`` is the outer product of two vectors.
     axes : mapping, optional
         Further axes of the grid: values of any key of the scenario that takes a number, elements from 1:
         ``{"chain.lengths[1]": array, "run.duration": array}``.
@@ -70,36 +70,36 @@ def ensemble(
         Keys that are drawn for each member: ``{"start.theta[1]": ("normal", mean, deviation)}`` or ``("uniform", from,
         to)``. Not beside axes.
     members, seed : int, optional
-        Of what is drawn.
+        Number of members and seed, for ``random``.
     keep : str or sequence of str, optional
         As in a scenario: "final", "points", "energy", "energy_error", "steps", "lyapunov", "ftle", "megno",
-        "event:NAME". Left out: final, energy_error, steps and all events. With ``t`` columns of rows, "theta", "x_2";
-        left out, all.
+        "event:NAME"; by default final, energy_error, steps and all events. With ``t``: columns of rows, "theta", "x_2";
+        by default all.
     events : mapping, optional
         As for :meth:`Chain.simulate`.
     tolerance, step, accuracy, method, stages, form, solver, iteration, estimate
-        As ``[run]`` of a scenario; a tolerance of 1e-9 where nothing says otherwise. ``method="auto"`` is
-        that of ``[ensemble]``: exponents, too, go by what is quickest in lanes.
+        As ``[run]`` of a scenario; by default a tolerance of 1e-9. ``method="auto"`` is that of ``[ensemble]``: it
+        takes the quickest method in lanes, for exponents, too.
     threads : int
         0: as many as there are processors.
     file : path, optional
-        An HDF5 file for the result, with journals beside it, so that nothing is lost whatever ends the process.
+        An HDF5 file for the result, with journals beside it, so that finished members are not lost if the process ends.
     shard : (int, int), optional
-        ``(2, 8)``: only the second eighth. All shards name one file, which the last one completes; or one each, for
-        :func:`merge`.
+        ``(2, 8)``: only the second eighth. All shards name one file, which the last one completes; or each has its own
+        file, for :func:`merge`.
     resume : bool
-        Whether to go on with what an interrupted one has left beside ``file``.
+        Whether to continue from the journals that an interrupted ensemble has left beside ``file``.
     client : distributed.Client, optional
-        Workers of a cluster move the members, one thread each; the same bytes come back. A worker that dies loses
-        nothing.
+        Workers of a cluster move the members, one thread each, with the same result to the last bit. If a worker dies,
+        others take over its members.
     progress : bool
-        Whether to show on the way how many members are done.
+        Whether to show how many members are done.
 
     Returns
     -------
     xarray.Dataset
-        Over the axes, or over ``member``; names, units and attributes as in the file (docs/reference/ensembles.md):
-        ``status`` is 0 of members that came to their end, ``trusted`` 1 or 0 of those that were looked at again, else
+        Over the axes, or over ``member``; names, units and attributes as in the file (docs/reference/ensembles.md).
+        ``status`` is 0 for members that reached their end, ``trusted`` 1 or 0 for those that had a second look, else
         -1. With ``shard`` members that are not done have status -1, and the attribute ``complete`` is 0 until all are.
 
     Raises
@@ -112,7 +112,7 @@ def ensemble(
     Warns
     -----
     TrustWarning
-        How many members failed or cannot be trusted, and the first one.
+        The number of members that failed or cannot be trusted, and the first of them.
 
     Examples
     --------
@@ -183,7 +183,7 @@ def move_members(
     client: Any,
     progress: bool,
 ) -> xarray.Dataset:
-    """Moves the members of a scenario's text, for whoever was called from outside."""
+    """Moves the members of a scenario's text. Call it from a public function only: warnings name its caller."""
     how_many = threads_of(threads)
     part = None if shard is None else _shard(shard)
     if file is None and (part or resume):

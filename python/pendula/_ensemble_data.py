@@ -16,16 +16,16 @@ if TYPE_CHECKING:
 
     from . import _core
 
-# Attributes of a data set that are its own, not those by which HDF5 ties it to its scales.
+# Attributes of a data set, without those by which HDF5 attaches it to its scales.
 OWN = ("long_name", "units", "natural_unit", "flag_values", "flag_meanings")
 
 
-# What comes of moving members.
+# Data sets that only exist once members were moved.
 MOVED = ("status", "trusted", "steps")
 
 
 def dataset_of(made: _core.Ensemble, has_moved: bool = True) -> xarray.Dataset:
-    """What came of members in memory, as :func:`open_ensemble` has it of a file; or what is known before."""
+    """The dataset of members in memory, as :func:`open_ensemble` reads it from a file; or of members not moved yet."""
     data: dict[str, Any] = {}
     scales: dict[str, Any] = {}
     for k, (name, kind, attributes, flags) in enumerate(made.arrays):
@@ -93,7 +93,7 @@ def _plain(value: Any) -> Any:
 
 
 def merge(files: str | PathLike[str] | Sequence[str | PathLike[str]]) -> xarray.Dataset:
-    """What shards that wrote files of their own have found together.
+    """Joins the datasets of shards that wrote files of their own.
 
     Parameters
     ----------
@@ -103,7 +103,7 @@ def merge(files: str | PathLike[str] | Sequence[str | PathLike[str]]) -> xarray.
     Returns
     -------
     xarray.Dataset
-        As if one process had moved all members.
+        The same as if one process had moved all members.
 
     Raises
     ------

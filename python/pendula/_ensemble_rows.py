@@ -1,4 +1,4 @@
-"""Members of ensembles over time: their rows."""
+"""Rows of the members of ensembles, over time."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def rows_of_members(
     threads: int,
     progress: bool,
 ) -> xarray.Dataset:
-    """Moves the members of an ensemble, each as a run of its own: that of the scenario ``alone`` with its numbers."""
+    """Moves the members of an ensemble, each as a run of the scenario ``alone`` with the numbers of the member."""
     how_many = threads_of(threads) or os.cpu_count() or 1
     with plainly():
         made = _core.Ensemble(text, "pendula", [], "pendula.ensemble", *places(), tell)
@@ -104,7 +104,7 @@ def rows_of_members(
 
 
 def threads_of(given: object) -> int:
-    """How many; 0 for all processors. Raises InputError."""
+    """The number of threads; 0 for all processors. Raises InputError."""
     if isinstance(given, (int, np.integer)) and not isinstance(given, bool) and 0 <= given <= 1024:
         return int(given)
     raise InputError(f"threads: expected how many up to 1024, 0 for all processors, got {given!r}")
@@ -112,7 +112,7 @@ def threads_of(given: object) -> int:
 
 @contextmanager
 def _pool(threads: int) -> Iterator[ThreadPoolExecutor]:
-    """Threads; what has not begun is left where something is raised, as by Ctrl-C."""
+    """A pool of threads. An exception, as by Ctrl-C, cancels work that has not begun."""
     pool = ThreadPoolExecutor(threads)
     try:
         yield pool
@@ -121,7 +121,7 @@ def _pool(threads: int) -> Iterator[ThreadPoolExecutor]:
 
 
 def _kept(columns: list[str], order: list[int], keep: Sequence[str] | None) -> list[int]:
-    """Columns, in their order. Raises InputError."""
+    """Indices of the columns to keep, in their order. Raises InputError."""
     if keep is None:
         return order
     names = [columns[k] for k in order]

@@ -1,4 +1,4 @@
-"""Ensembles as scenarios: which numbers their members have."""
+"""Ensembles as scenarios: the numbers of their members."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ DRAWN = {"normal": ("mean", "deviation"), "uniform": ("from", "to")}
 
 
 class Design:
-    """What the members of a system have in common, and what each has for itself."""
+    """The numbers that all members of a system share, and those that each has for itself."""
 
     def __init__(self, system: System) -> None:
         self._system = system
@@ -33,7 +33,7 @@ class Design:
         self._families = dict.fromkeys(system.at_zero())  # of a chain's start: theta, phi, ...
 
     def add_start(self, start: Mapping[str, object]) -> None:
-        """Tuples are axes of a grid, arrays list the members, numbers and texts are those of all."""
+        """Adds a start. Tuples are axes of a grid, arrays have an entry for each member, others hold for all."""
         for name, given in start.items():
             for column, one in self._columns_of(name, given):
                 self._add(column, one, is_axis=isinstance(given, tuple))
@@ -56,7 +56,7 @@ class Design:
             self._drawn[key] = given
 
     def tables(self) -> dict[str, Any]:
-        """Those of a scenario that say what moves, where it starts, and which numbers members have."""
+        """The tables of a scenario for the system, its start, and the numbers of members."""
         of_each = bool(self._lists or self._drawn)
         if bool(self._axes) == of_each:
             raise InputError(
@@ -91,7 +91,7 @@ class Design:
             self._lists[key] = values
 
     def _columns_of(self, name: str, given: object) -> list[tuple[str, object]]:
-        """What each column has: a number, a text, or an array of one axis."""
+        """Each column with its value: a number, a text, or an array of one axis."""
         links = columns_of(name, self._columns)
         if not links:
             require_known("start", [name], self._columns)
@@ -112,14 +112,14 @@ class Design:
         return [(column, array[:, k]) for k, column in enumerate(links)]
 
     def _key(self, column: str) -> str:
-        """A chain's scenario has arrays, one number a link; others have each coordinate by its name."""
+        """The key of a column. Scenarios of chains have arrays over links, others each coordinate by its name."""
         if not isinstance(self._system, Chain):
             return f"start.{column}"
         family, link = column.rsplit("_", 1)
         return f"start.{family}[{link}]"
 
     def _start(self) -> dict[str, object]:
-        """From amid those of the members: at the ends of a range a model is singular more often."""
+        """A start amid those of the members: at the ends of a range a model is singular more often."""
         if not isinstance(self._system, Chain):
             of_members = {**self._axes, **self._lists}
             amid: dict[str, object] = {
@@ -136,7 +136,7 @@ class Design:
         }
 
     def _write_as_array(self, tables: dict[str, Any], key: str) -> None:
-        """A key of one link needs an array that it is in."""
+        """Writes the array that contains the key of one link."""
         found = re.fullmatch(r"(chain|start)\.(\w+)\[\d+\]", key)
         if found is None:
             return
@@ -148,17 +148,17 @@ class Design:
 
 
 def _mean(given: Sequence[Any]) -> object:
-    """Of ("normal", mean, deviation) or ("uniform", from, to)."""
+    """The mean of ("normal", mean, deviation) or ("uniform", from, to)."""
     try:
         return given[1] if given[0] == "normal" else (given[1] + given[2]) / 2
     except TypeError:
-        return given[1]  # no number, which the reader tells
+        return given[1]  # not a number: the reader of scenarios reports it
 
 
 def ensemble_text(
     tables: Mapping[str, Any], *, method: object, members: object, seed: object, keep: object
 ) -> str:
-    """A scenario's text. What is None is left to its defaults."""
+    """The text of a scenario. Arguments that are None are left to defaults."""
     if keep is not None and (not isinstance(keep, Sequence) or not all(isinstance(x, str) for x in keep)):
         raise InputError(f"keep: expected names of what is kept, got {keep!r}")
     ensemble = {

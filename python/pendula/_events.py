@@ -32,7 +32,7 @@ def events_of(events: object) -> tuple[list[dict[str, object]], list[tuple[str, 
 
 
 def event_tables(events: object) -> list[dict[str, object]]:
-    """The same of expressions alone. Raises InputError."""
+    """The same for expressions only. Raises InputError."""
     tables, functions = events_of(events)
     if functions:
         raise InputError(f"events.{functions[0][0]}: expected an expression, got a function")

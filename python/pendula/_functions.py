@@ -30,7 +30,7 @@ class _NoText(Exception):  # noqa: N818  (nobody sees it)
     """The text of a function is not known."""
 
 
-# What a file begins with that has functions as they were compiled.
+# The beginning of a file with compiled functions.
 COMPILED = """import base64
 import importlib.util
 import marshal
@@ -53,9 +53,9 @@ def _function(name, code, defaults, keywords, cells):
 
 
 class _Text:
-    """The text of a function and of all that it uses, as one that stands alone.
+    """The text of a function and of all that it uses, as a self-contained file.
 
-    Where the text of one of them is not known, as in a plain interpreter, all are there as they were compiled.
+    If the text of one of them is unknown, as in a plain interpreter, the file has all of them in compiled form.
     """
 
     def __init__(self, function: types.FunctionType, *, compiled: bool = False) -> None:
@@ -74,7 +74,7 @@ class _Text:
         return "\n".join([*sorted(self._imports), "", "", "\n\n\n".join(part for part, _ in self._parts), ""])
 
     def lines(self) -> dict[int, str]:
-        """Of lines of the text, where they come from; of what was compiled the lines are its own."""
+        """The origins of lines of the text. Compiled functions keep their own line numbers."""
         found: dict[int, str] = {}
         first = len(self._imports) + 3
         for part, lines in self._parts:
@@ -131,7 +131,7 @@ class _Text:
         self._parts.append((f"{name} = _function({', '.join(arguments)})", where))
 
     def _use_all(self, function: types.FunctionType, lines: Mapping[str, int]) -> None:
-        """What a function uses from around it, and the lines where it does."""
+        """Adds the names that a function uses from its surroundings, given the lines of their use."""
         surroundings = {**function.__globals__, **_cells(function)}
         for used, line in sorted(lines.items()):
             if used in surroundings:
@@ -140,7 +140,7 @@ class _Text:
                 raise _unknown_name(function, used, line)
 
     def _require_one(self, where: str, name: str, what: object) -> bool:
-        """Whether a name is new. Raises InputError where it means something else elsewhere."""
+        """Whether a name is new. Raises InputError if it means something else elsewhere."""
         if name not in self._known:
             self._known[name] = what
             return True
@@ -180,7 +180,7 @@ class _Text:
 
 
 def _unknown_name(function: types.FunctionType, name: str, line: int) -> InputError:
-    """With its line, and names that are near."""
+    """The error for an unknown name, with its line and similar names."""
     import sympy
 
     code = function.__code__
@@ -194,7 +194,7 @@ def _unknown_name(function: types.FunctionType, name: str, line: int) -> InputEr
 
 
 def _names_in(code: types.CodeType) -> set[str]:
-    """What it uses from around it."""
+    """The names that code uses from its surroundings."""
     found = {*code.co_freevars}
     for one in dis.get_instructions(code):
         if one.opname in ("LOAD_GLOBAL", "LOAD_NAME"):
@@ -206,7 +206,7 @@ def _names_in(code: types.CodeType) -> set[str]:
 
 
 def _nowhere(code: types.CodeType) -> types.CodeType:
-    """The same in no file, so that one model is one wherever it was typed."""
+    """The same code without a file name, so that a model does not depend on where it was typed."""
     inside = tuple(_nowhere(one) if isinstance(one, types.CodeType) else one for one in code.co_consts)
     return code.replace(co_filename="", co_consts=inside)
 
@@ -216,7 +216,7 @@ def _is_plain(what: object) -> bool:
 
 
 def _literal(what: object) -> str:
-    """Of a number or a text, whatever class of them it is of."""
+    """The literal of a number or a text, of a subclass, too."""
     if isinstance(what, float):
         number = float(what)
         return repr(number) if math.isfinite(number) else f'float("{number}")'
@@ -230,7 +230,7 @@ def _literal(what: object) -> str:
 
 
 def _definition(function: types.FunctionType, is_model: bool) -> ast.FunctionDef:
-    """The text of a function, which is compiled to what the function is. Raises InputError, and _NoText."""
+    """The definition of a function, checked to compile to the same code. Raises InputError, and _NoText."""
     name = function.__name__
     try:
         source = textwrap.dedent(inspect.getsource(function))
@@ -256,7 +256,7 @@ def _definition(function: types.FunctionType, is_model: bool) -> ast.FunctionDef
 
 
 def _is_text_of(definition: ast.FunctionDef, function: types.FunctionType) -> bool:
-    """Compiles it where the same names are free."""
+    """Whether a definition, compiled with the same free names, gives the code of the function."""
     arguments = [ast.arg(free) for free in function.__code__.co_freevars]
     around = ast.FunctionDef(
         name="around",
@@ -275,7 +275,7 @@ def _is_text_of(definition: ast.FunctionDef, function: types.FunctionType) -> bo
 
 
 def _same(a: types.CodeType, b: types.CodeType) -> bool:
-    """Whether they do the same; how methods are called depends on where a function stands."""
+    """Whether two codes do the same. They need not be equal: calls of methods depend on where a function stands."""
     if _operations(a) != _operations(b) or len(a.co_consts) != len(b.co_consts):
         return False
     for one, other in zip(a.co_consts, b.co_consts, strict=True):
@@ -297,7 +297,7 @@ def _operations(code: types.CodeType) -> list[str]:
 
 
 def _cells(function: types.FunctionType) -> dict[str, object]:
-    """What surrounds it where it was defined."""
+    """The values of a function's free variables."""
     found: dict[str, object] = {}
     for name, cell in zip(function.__code__.co_freevars, function.__closure__ or (), strict=True):
         try:
@@ -319,7 +319,7 @@ def _cache() -> Path:
 
 
 def kept_model(name: str, text: str) -> Path:
-    """A file with that text."""
+    """A file with that text, in the cache."""
     folder = _cache() / hashlib.sha256(text.encode()).hexdigest()[:16]
     file = folder / f"{name}.py"
     try:
@@ -338,7 +338,7 @@ def kept_model(name: str, text: str) -> Path:
 
 
 class ModelFunction:
-    """What :func:`model` makes: called with parameters by name it gives a :class:`Model`.
+    """The result of :func:`model`. Called with parameters by name it returns a :class:`Model`.
 
     Attributes
     ----------
@@ -366,7 +366,7 @@ class ModelFunction:
             written: _Text | None = _Text(function)
         except _NoText:
             written = None
-        if written is None:  # out of the handler, whose exception an error would show
+        if written is None:  # outside the handler, so that errors do not show its exception
             written = _Text(function, compiled=True)
         self.file: Path = kept_model(name, written.text())
         written_from[str(self.file)] = written.lines()
@@ -391,12 +391,12 @@ class ModelFunction:
 
 
 def model(function: Callable[[Any, int], None]) -> ModelFunction:
-    """A model of one's own, by its Lagrangian, as a decorator.
+    """A decorator that makes an own model from its Lagrangian.
 
-    The function may use SymPy, numbers, texts, and functions like it, which are kept as they are now: what changes
-    later has no effect. Its kernel is derived and compiled once (or interpreted where there is no C compiler), and
-    kept. In a plain interpreter, where the text of functions is not known, it is kept as it was compiled, for this
-    version of Python.
+    The function may use SymPy, numbers, texts, and functions of the same kind. They are kept as they are now: later
+    changes have no effect. Its kernel is derived and compiled once (or interpreted without a C compiler), and kept. In
+    a plain interpreter, where the text of functions is unknown, the compiled function is kept, for this version of
+    Python.
 
     Raises
     ------

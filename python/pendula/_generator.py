@@ -1,4 +1,4 @@
-"""The generator of kernels in this process, which has SymPy already where a model is a function."""
+"""The generator of kernels in this process: if a model is a function, SymPy is loaded here already."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ from typing import Any, TextIO
 
 _NAME = "pendula_codegen"
 _one_at_a_time = threading.RLock()  # a model may itself use models
-_imported: dict[Path, int] = {}  # its files, and when they were changed
+_imported: dict[Path, int] = {}  # files of the generator, and their modification times
 
 
 def generate(codegen: str, python: str, arguments: list[str]) -> tuple[int, str] | None:
-    """Does what ``python -m pendula_codegen`` does. Its exit status, and what it printed.
+    """Does what ``python -m pendula_codegen`` does. Returns its exit status and its output.
 
-    None where a process of its own has to do it: ``python`` is another one, or what is imported here is not what
-    the folder ``codegen`` asks for.
+    None if a process of its own has to do it: ``python`` is another one, or the packages here are not those that the
+    folder ``codegen`` requires.
     """
     if python != sys.executable:
         return None
@@ -39,7 +39,7 @@ def _main_of(codegen: Path) -> Callable[[list[str]], int] | None:
         if not _has_packages(codegen / "requirements.txt") or not _import_package(folder):
             return None
         _imported.update(found)
-    # Another one, or one whose files have changed since: kernels are kept under the names of those.
+    # The imported generator is another one, or its files have changed since: the names of kept kernels depend on them.
     if _imported != found:
         return None
     main: Callable[[list[str]], int] = importlib.import_module(f"{_NAME}.__main__").main
@@ -47,13 +47,13 @@ def _main_of(codegen: Path) -> Callable[[list[str]], int] | None:
 
 
 def _has_packages(requirements: Path) -> bool:
-    """Whether those that decide what is generated are new enough here."""
+    """Whether the packages that generated text depends on are new enough here."""
     try:
         text = requirements.read_text(encoding="utf-8")
         needed = re.findall(r"^(mpmath|sympy)>=(\S+)", text, re.MULTILINE)
         found = [(importlib.import_module(name).__version__, version) for name, version in needed]
         return bool(found) and all(_numbers(here) >= _numbers(version) for here, version in found)
-    except Exception:  # whatever is called so, and is found first
+    except Exception:  # another module of that name may be found first
         return False
 
 
@@ -63,7 +63,7 @@ def _numbers(version: str) -> list[int]:
 
 
 def _import_package(folder: Path) -> bool:
-    """Imports it from there, wherever else modules are found."""
+    """Imports the generator from a folder, regardless of sys.path. Returns whether that worked."""
     spec = importlib.util.spec_from_file_location(
         _NAME, folder / "__init__.py", submodule_search_locations=[str(folder)]
     )
@@ -76,7 +76,7 @@ def _import_package(folder: Path) -> bool:
         importlib.import_module(f"{_NAME}.__main__")
     except BaseException as error:
         del sys.modules[_NAME]
-        if isinstance(error, Exception):  # what it needs is not here, or something else is called so
+        if isinstance(error, Exception):  # a package is missing, or another module has its name
             return False
         raise
     return True
@@ -90,7 +90,7 @@ def _run(main: Callable[[list[str]], int], arguments: list[str]) -> tuple[int, s
     with _printing_to(printed), mpmath.workprec(53):
         try:
             status = main(arguments)
-        except SystemExit as end:  # of a model, too
+        except SystemExit as end:  # also if a model raises it
             status = _status_of(end)
         except Exception:
             traceback.print_exc()
@@ -118,7 +118,7 @@ class _Printer:
 
 @contextmanager
 def _printing_to(printed: TextIO) -> Iterator[None]:
-    """This thread prints there; others print as they did."""
+    """Redirects the output of this thread; others print as before."""
     usual = {name: getattr(sys, name) for name in ("stdout", "stderr")}
     ours = {name: _Printer(printed, stream or io.StringIO()) for name, stream in usual.items()}
     for name, stream in ours.items():

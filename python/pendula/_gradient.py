@@ -1,4 +1,4 @@
-"""What a number that depends on a motion changes by: by the start, by parameters and by inputs."""
+"""Gradients of a number that depends on a motion: with respect to the start, parameters and inputs."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ if TYPE_CHECKING:
 
 
 class Gradient(NamedTuple):
-    """What a number that depends on a motion changes by."""
+    """The gradient of a number that depends on a motion."""
 
     start: NDArray[np.float64]  #: (coordinates + rates,)
-    parameters: dict[str, NDArray[np.float64]]  #: (numbers of it,), by name
+    parameters: dict[str, NDArray[np.float64]]  #: by name: (numbers of it,)
     inputs: dict[str, NDArray[np.float64]]  #: the same
 
 
@@ -39,7 +39,7 @@ class Varied:
             self.count += size
 
     def by_name(self, numbers: NDArray[np.float64]) -> tuple[ByName, ByName]:
-        """What stands along the last axis, of parameters and of inputs."""
+        """Splits the last axis into parameters and inputs by name."""
         return (
             {name: numbers[..., place] for name, place in self.parameters.items()},
             {name: numbers[..., place] for name, place in self.inputs.items()},
@@ -52,7 +52,7 @@ def gradient(
     times: NDArray[np.float64],
     by_states: NDArray[np.float64],
 ) -> Gradient:
-    """Backward: from a number's gradient by the states at the times, (coordinates + rates, times)."""
+    """The gradient of a number, from its gradient by the states at the times, (coordinates + rates, times)."""
     varied = Varied(made)
     with plainly():
         _, by_start, by_varied = _core.backward(

@@ -1,4 +1,4 @@
-"""What inputs are given: numbers, which are held, and tables of numbers over time."""
+"""Values of inputs: numbers, which are held, and tables of numbers over time."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _KEYS = ("file", "column", "times", "values", "hold")
 
 
 def inputs_of(given: Mapping[str, object]) -> tuple[dict[str, object], Signals]:
-    """Those that are held, as they are, and signals: keys of a table ``[[system.signal]]`` each. Raises InputError."""
+    """Held inputs, as given, and signals, each as keys of a table ``[[system.signal]]``. Raises InputError."""
     held: dict[str, object] = {}
     signals: Signals = {}
     for name, one in given.items():

@@ -1,4 +1,4 @@
-"""Kernels by LLVM in this process, for those who have llvmlite and no C compiler: ``pendula[jit]``."""
+"""Kernels by LLVM in this process, without a C compiler, if llvmlite is installed: ``pendula[jit]``."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _engines: dict[
 
 @cache
 def is_there() -> bool:
-    """Whether llvmlite is, and new enough; it is not imported."""
+    """Whether llvmlite is installed and new enough; does not import it."""
     try:
         found = version("llvmlite").split(".")[:2]
     except PackageNotFoundError:
@@ -28,7 +28,7 @@ def is_there() -> bool:
 
 
 def compile_text(text: str, made: str) -> str:
-    """Compiles the file ``text`` to the object file ``made``. What is wrong, if anything is."""
+    """Compiles the file ``text`` to the object file ``made``. Returns an error message, or an empty text."""
     import llvmlite.binding as llvm  # type: ignore[import-not-found, import-untyped, unused-ignore]
 
     try:
@@ -37,7 +37,8 @@ def compile_text(text: str, made: str) -> str:
             module = llvm.parse_assembly(Path(text).read_text(encoding="utf-8"))
             module.verify()
             passes = llvm.create_new_module_pass_manager()
-            # Slots become registers; more was measured to change nothing, since steps are in single assignment.
+            # The only pass: it turns stack slots into registers. Further passes made no difference when measured,
+            # because each step's result is assigned once.
             passes.add_sroa_pass()
             passes.run(module, llvm.create_pass_builder(machine, llvm.create_pipeline_tuning_options()))
             Path(made).write_bytes(machine.emit_object(module))
@@ -47,7 +48,7 @@ def compile_text(text: str, made: str) -> str:
 
 
 def load(made: bytes) -> int | str:
-    """The address of the kernel that an object file has; or what is wrong with that."""
+    """The address of the kernel in an object file, or an error message."""
     try:
         import llvmlite.binding as llvm
 
@@ -68,5 +69,5 @@ def load(made: bytes) -> int | str:
 def _machine(llvm: Any) -> Any:
     llvm.initialize_native_target()
     llvm.initialize_native_asmprinter()
-    # Which instructions it may take a kernel says itself.
+    # The kernel itself says which instructions it may use.
     return llvm.Target.from_default_triple().create_target_machine(opt=2, codemodel="jitdefault", jit=True)

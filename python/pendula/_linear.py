@@ -1,4 +1,4 @@
-"""Linear systems beside a state."""
+"""Linearisations at a state."""
 
 from __future__ import annotations
 
@@ -18,16 +18,16 @@ if TYPE_CHECKING:
 
 
 class LinearSystem(tuple["NDArray[np.float64]", "NDArray[np.float64]"]):
-    """How a system moves beside a state: dx/dt = A x + B u, y = C x + D u; ``A, B = linear`` takes two of them.
+    """The linearisation of a system at a state: dx/dt = A x + B u, y = C x + D u; unpack it by ``A, B = linear``.
 
-    From one time to the next by a ``step`` it is x(t + step) = A x(t) + B u.
+    With a ``step`` it is discrete: x(t + step) = A x(t) + B u.
 
     Attributes
     ----------
     C, D : numpy.ndarray
-        How outputs change by the state, and by what is put in: a row an output.
+        Derivatives of outputs with respect to the state and to inputs: a row for each output.
     names, inputs, outputs : list of str
-        What x, u and y are.
+        Names of the numbers in x, u and y.
     step : float or None
         In s.
     """
@@ -56,7 +56,7 @@ class LinearSystem(tuple["NDArray[np.float64]", "NDArray[np.float64]"]):
 
     @property
     def eigenvalues(self) -> NDArray[np.complex128]:
-        """Of A: the slowest first; in 1/s, of a step without unit."""
+        """Eigenvalues of A, the slowest first; in 1/s, for a discrete system without unit."""
         found: Any = np.linalg.eigvals(self.A).astype(complex)
         order = np.lexsort((-found.imag, np.abs(self._exponents(found)).round(12)))
         ordered: NDArray[np.complex128] = found[order]
@@ -64,13 +64,13 @@ class LinearSystem(tuple["NDArray[np.float64]", "NDArray[np.float64]"]):
 
     @property
     def frequencies(self) -> NDArray[np.float64]:
-        """Of each eigenvalue its undamped natural frequency, in Hz."""
+        """The undamped natural frequency of each eigenvalue, in Hz."""
         return np.abs(self._exponents(self.eigenvalues)) / (2 * np.pi)
 
     @property
     def damping(self) -> NDArray[np.float64]:
-        """Of each eigenvalue its damping ratio: 0 swings for ever, 1 and more no longer swings, less than 0 grows;
-        NaN where nothing pulls back."""
+        """The damping ratio of each eigenvalue: 0 is undamped, from 1 on nothing swings, below 0 the motion grows; NaN
+        for the eigenvalue 0."""
         found = self._exponents(self.eigenvalues)
         with np.errstate(invalid="ignore"):
             return (0.0 - found.real) / np.abs(found)
@@ -99,7 +99,7 @@ def seen(
     state: NDArray[np.float64],
     held: Sequence[float],
 ) -> dict[str, Any]:
-    """C and D of what is measured, and what all numbers are. Raises InputError."""
+    """C and D of the measured quantities, and the names of all numbers. Raises InputError."""
     if isinstance(outputs, str) or not isinstance(outputs, (Mapping, Sequence, type(None))):
         raise InputError(f"outputs: expected columns or expressions, got {outputs!r}")
     if outputs is None:

@@ -26,15 +26,15 @@ def map(
     Parameters
     ----------
     data : xarray.Dataset
-        Of :func:`ensemble` or :func:`open_ensemble`, over one axis or two; the first one goes to the right.
+        From :func:`ensemble` or :func:`open_ensemble`, over one axis or two; the first one is horizontal.
     key : str
-        The name of a data set, or what ``keep`` calls it: "theta_2", "final:theta_2", "event:flip".
+        The name of a data set, or its name in ``keep``: "theta_2", "final:theta_2", "event:flip".
     axes : matplotlib Axes, optional
-        Left out, those of a new figure.
+        By default those of a new figure.
     scale : {"log", "linear"}, optional
-        Left out, logarithmic where a positive number spans a wide range. Angles are cyclic.
+        By default logarithmic if a positive number spans a wide range. Angles are cyclic.
     contour : (str, float), optional
-        A line where another number has that value.
+        The name of another number and its value on a line.
 
     Returns
     -------
@@ -62,7 +62,7 @@ def map(
     errors = module_of_pictures("errors")
     try:
         shown = _of(drawing, data, key, line)
-        # Before the style is in force: the first figure chooses a backend, and what that sets has to stay, or else a
+        # Made before the style is set: the first figure chooses a backend, whose settings have to stay. Otherwise a
         # notebook shows no figure after this one.
         figure = plt.figure(layout="constrained") if axes is None else axes.figure
         with drawing.style(), errors.told_of_numbers("data"):
@@ -78,7 +78,7 @@ def map(
 
 
 def _of(drawing: Any, data: xarray.Dataset, key: str, line: str) -> Any:
-    """The numbers that are shown, as the pictures have them of a file."""
+    """The numbers to show, in the form that pictures read from a file."""
     status = data["status"]
     if len(status.dims) > 2 or "member" in status.dims:
         raise InputError(f"data: expected one axis or two, got {', '.join(str(dim) for dim in status.dims)}")

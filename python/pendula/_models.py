@@ -27,7 +27,7 @@ class Kernel(NamedTuple):
     """How the functions of a model run."""
 
     by: str  #: "built in", "compiled", "jit" (by LLVM in this process) or "interpreted"
-    file: Path | None  #: where it is kept; None if it is part of pendula
+    file: Path | None  #: the file of the kernel; None if it is part of pendula
 
 
 def models() -> list[str]:
@@ -48,19 +48,19 @@ class Model(System):
     model : str or path
         ``"furuta"`` (``pendula models`` lists them), or a file that defines ``define(model, links)``.
     links : int, optional
-        Of models with as many links as asked for.
+        Number of links, for models whose number of links is free.
     inputs : mapping, optional
-        Of inputs, by name: a number, which is held, or a table of numbers over time, linear in between: ``(times,
-        values)``, the name of a CSV file with columns ``t`` and that of the input, or a mapping with ``times`` and
-        ``values`` or ``file`` and ``column``, and ``hold=True`` for steps.
+        Values of inputs by name: a number, which is held, or a table of numbers over time, linear in between:
+        ``(times, values)``, the name of a CSV file with columns ``t`` and that of the input, or a mapping with
+        ``times`` and ``values`` or ``file`` and ``column``, and ``hold=True`` for steps.
     drives : sequence of mappings, optional
         Inputs that depend on time: ``input``, ``amplitude``, ``frequency``, ``phase``, ``constant``, or ``value``, an
         expression of time: ``"t < 1 ? 2 : 0"``.
     feedback : sequence of mappings, optional
-        What is added to inputs as a function of the motion: ``input``, ``value`` (an expression of the columns:
+        Functions of the motion that are added to inputs: ``input``, ``value`` (an expression of the columns:
         ``"-12*x - 9*x_dot"``), and for a controller that samples ``sample`` (s) and ``limit``.
     parameters
-        By name; the model has defaults.
+        Parameters by name; others have the model's defaults.
 
     Raises
     ------
@@ -102,7 +102,7 @@ class Model(System):
         self._require_arguments()
 
     def _plain(self, name: str, given: object) -> object:
-        """A parameter without its unit; what is wrong stays as it is, for the reader of scenarios."""
+        """A parameter without its unit; wrong values stay as they are, for the reader of scenarios."""
         if isinstance(given, (list, tuple)):
             return [self._plain(name, one) for one in given]
         found = self._info.with_unit(given, name) if isinstance(given, str) else None
@@ -116,7 +116,7 @@ class Model(System):
         }, signals
 
     def _require_arguments(self) -> None:
-        """Raises InputError; parameters without a default need not be there before the model moves."""
+        """Raises InputError for wrong arguments. Parameters without a default may be given later."""
         tables = self.tables()
         later = {name: 1.0 for name, _, default in self._info.parameters if math.isnan(default)}
         tables["system"] = {**tables["system"], "parameters": {**later, **self._parameters} or None}  # type: ignore[dict-item]
@@ -145,7 +145,7 @@ class Model(System):
 
     @property
     def links(self) -> int:
-        """How many; 1 of a model without links."""
+        """Number of links; 1 for a model without links."""
         return self._info.links
 
     @property
@@ -160,7 +160,7 @@ class Model(System):
 
     @property
     def inputs(self) -> list[str]:
-        """Names of the inputs. Motions, which ``pendula describe`` lists, are none: drives alone move them."""
+        """Names of the inputs. Motions, which ``pendula describe`` lists, are no inputs: only drives move them."""
         return [name for name, _ in self._info.inputs]
 
     @property
@@ -170,13 +170,13 @@ class Model(System):
 
     @property
     def parameters(self) -> dict[str, object]:
-        """As they were given, without units, or the model's defaults; NaN where it has none."""
+        """Parameters as given, without units, or the model's defaults; NaN if there is none."""
         defaults = {name: default for name, _, default in self._info.parameters}
         return {**defaults, **copy.deepcopy(self._parameters)}
 
     @property
     def kernel(self) -> Kernel:
-        """How the model's functions run: it is made if need be.
+        """How the model's functions run. Makes the kernel if need be.
 
         >>> import pendula
         >>> pendula.Model("furuta").kernel.by in ("built in", "compiled", "jit", "interpreted")

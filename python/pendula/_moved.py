@@ -29,7 +29,8 @@ class Moved:
         self.made = self._prepared(system)
         self.varied = Varied(self.made)
         self.size = int(self.made.start.size)
-        # What has no derivatives is told now, and not while another program runs it.
+        # Run once with no directions: a system without derivatives raises its error here, not later, inside JAX or
+        # PyTorch.
         none = np.zeros((self.size, 0)), np.zeros((self.varied.count, 0))
         with plainly():
             _core.forward(self.made, self.made.time, self.made.start, np.zeros(0), *none)
@@ -52,7 +53,7 @@ class Moved:
         return {name: known[name] for name in names}
 
     def require(self, state: Any, values: Mapping[str, Any]) -> None:
-        """Raises InputError unless arrays have the numbers that the system has."""
+        """Raises InputError unless arrays have the sizes of the system."""
         if tuple(state.shape) != (self.size,):
             raise InputError(f"state: expected shape ({self.size},), got {tuple(state.shape)}")
         for name, place in self.places(values).items():
@@ -75,7 +76,7 @@ class Moved:
     def derivatives(
         self, state: Any, values: Mapping[str, Any]
     ) -> tuple[NDArray[np.float64], dict[str, NDArray[np.float64]]]:
-        """By the state and by each value: (coordinates + rates, times, numbers of it)."""
+        """Derivatives with respect to the state and to each value: (coordinates + rates, times, numbers of it)."""
         places = self.places(values)
         seeds = np.eye(self.size + self.varied.count)
         columns = [slice(0, self.size)] + [
@@ -87,7 +88,7 @@ class Moved:
         return by_state, dict(zip(places, by_values, strict=True))
 
     def gradient(self, state: Any, values: Mapping[str, Any], by_states: Any) -> Gradient:
-        """Backward, from a number's gradient by the states, (coordinates + rates, times)."""
+        """The gradient of a number, from its gradient by the states, (coordinates + rates, times)."""
         made, start = self._start(state, values)
         return gradient(made, start, made.time + self.times, np.asarray(by_states, dtype=float))
 

@@ -22,11 +22,11 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 
-POINTS = 2000  # of a curve: as many as a picture can show
+POINTS = 2000  # points of a curve: as many as a picture can show
 
 
 def module_of_pictures(name: str) -> Any:
-    """A module of the package that draws for `pendula plot` and `pendula map`, too."""
+    """A module of the package that also draws for `pendula plot` and `pendula map`."""
     if "pendula_plot" not in sys.modules:
         folder = Path(_core.plotting_folder(places()[0])) / "pendula_plot"
         found = importlib.util.spec_from_file_location("pendula_plot", folder / "__init__.py")
@@ -52,7 +52,7 @@ def plot(
     axes: Axes | None,
     label: str | None,
 ) -> Axes:
-    """Columns over time, those of one unit in one panel; in the style of `pendula plot`. Raises InputError."""
+    """Draws columns over time, a panel for each unit, in the style of `pendula plot`. Raises InputError."""
     try:
         import matplotlib.pyplot as plt
 
@@ -96,7 +96,7 @@ def frames(t: NDArray[np.float64], seconds: float | None, fps: float) -> NDArray
 
 
 def iframe(page: str) -> str:
-    """A page as a part of another one, which it cannot reach."""
+    """A page embedded in another one, sandboxed from it."""
     return (
         f'<iframe srcdoc="{escape(page)}" sandbox="allow-scripts" title="pendula" '
         'style="width: 100%; height: 640px; border: 0"></iframe>'
@@ -110,7 +110,7 @@ def animation(
     units: list[str],
     interval: float,
 ) -> FuncAnimation:
-    """``points`` are the columns of the components of each; they are joined in order, from the origin on."""
+    """An animation of points. ``points`` has the columns of the components of each; lines join them from the origin."""
     dimension = max((len(point) for point in points), default=0)
     if dimension == 0:
         raise InputError("animate: expected a system with points, got one without")

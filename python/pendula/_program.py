@@ -6,7 +6,7 @@ from pathlib import Path
 
 
 def main() -> None:
-    """Becomes the program; models are derived by this Python."""
+    """Replaces this process by the program, which derives models by this Python."""
     program = Path(__file__).parent / "bin" / "pendula"
     os.environ.setdefault("PENDULA_PYTHON", sys.executable)
     os.execv(program, [str(program), *sys.argv[1:]])

@@ -1,4 +1,4 @@
-"""How far runs and ensembles that take long are."""
+"""Progress of long runs and ensembles."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from ._runs import missing
 
 
 def _is_watched() -> bool:
-    """Whether somebody looks: at a terminal, or at a notebook."""
+    """Whether output is seen: on a terminal, or in a notebook."""
     return "ipykernel" in sys.modules or (sys.stderr is not None and sys.stderr.isatty())
 
 
@@ -27,9 +27,9 @@ def _tqdm() -> Any:
 
 @contextmanager
 def bar(duration: object, wanted: bool | None) -> Iterator[Callable[[float], None] | None]:
-    """What is told the time that a run has come to, in s; None where no bar is wanted.
+    """Yields a function to call with the present time of a run, in s; None if no bar is wanted.
 
-    Raises ImportError where it is wanted and tqdm is not there.
+    Raises ImportError if it is wanted and tqdm is not installed.
     """
     if wanted is None:
         wanted = _is_watched() and importlib.util.find_spec("tqdm") is not None
@@ -61,7 +61,7 @@ _TIME = "t = {n:.4g} [{elapsed}]"
 
 @contextmanager
 def progress_line(wanted: bool, members: int) -> Iterator[Callable[[int], None] | None]:
-    """Something to tell how many members are done: a bar of tqdm, else a line on standard error."""
+    """Yields a function to call with the number of members done; it shows a bar of tqdm, else a line."""
     if not wanted:
         yield None
         return

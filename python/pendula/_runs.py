@@ -1,4 +1,4 @@
-"""What all functions have in common: their arguments, errors and warnings."""
+"""Arguments, errors and warnings of all functions."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ if TYPE_CHECKING:
 
 
 class TrustWarning(UserWarning):
-    """The rows of a run can be trusted less far than was asked for; the sentence says how far, and what helps."""
+    """The rows of a run are less accurate than was asked for; the message says by how much, and what helps."""
 
 
 class RunFailed(RuntimeError):  # noqa: N818  (the name is fixed)
-    """The computation failed. ``partial`` is the solution up to there, or the dataset of an ensemble none of whose
-    members came to its end; None of a :class:`Simulation`."""
+    """The computation failed. ``partial`` is the solution up to there, or the dataset of an ensemble if none of its
+    members reached its end; None for a :class:`Simulation`."""
 
     def __init__(self, message: str, partial: Any = None) -> None:
         super().__init__(message)
@@ -37,12 +37,12 @@ class RunFailed(RuntimeError):  # noqa: N818  (the name is fixed)
         return RunFailed, (str(self), self.partial)
 
 
-# Of files that were made of functions: where each line comes from, "page.py:12".
+# For files made of functions: the origin of each line, "page.py:12".
 written_from: dict[str, dict[int, str]] = {}
 
 
 def _where_written(sentence: str) -> str:
-    """Lines of functions in place of those of files that were made of them."""
+    """Replaces lines of files made of functions by the lines of these functions."""
     for file, lines in written_from.items():
         for told in re.findall(re.escape(file) + r":(\d+)", sentence):
             before = max((line for line in lines if line <= int(told)), default=min(lines))
@@ -54,7 +54,7 @@ def _where_written(sentence: str) -> str:
 
 
 class Raised(Exception):  # noqa: N818  (nobody sees it)
-    """What a function of the user has raised, on its way through C++: its first argument."""
+    """Carries an exception of a user's function, its first argument, through C++."""
 
 
 _WORDS = {  # of the program, and ours
@@ -65,7 +65,7 @@ _WORDS = {  # of the program, and ours
 
 @contextmanager
 def plainly(names: Mapping[str, str] | None = None) -> Iterator[None]:
-    """Errors about arguments name those, not lines and keys of a text that nobody wrote.
+    """Makes errors name arguments, not lines and keys of the scenario text that was made from them.
 
     ``names`` are those of numbered tables: ``{"event[1]": "events.flip"}``.
     """
@@ -84,7 +84,7 @@ def plainly(names: Mapping[str, str] | None = None) -> Iterator[None]:
 
 
 def in_arguments(sentence: str, names: Mapping[str, str] | None = None) -> str:
-    """A sentence about a scenario that was made of arguments."""
+    """Rewrites a sentence about a scenario in terms of the arguments that it was made from."""
 
     def numbered(table: re.Match[str]) -> str:
         plural = {"feedback": "feedback"}.get(table[2], f"{table[2]}s")
@@ -97,21 +97,21 @@ def in_arguments(sentence: str, names: Mapping[str, str] | None = None) -> str:
 
 
 def places() -> tuple[str, str]:
-    """Where the program of this package is, and the Python that derives kernels."""
+    """The folder of this package's program, and the Python that derives kernels."""
     return str(Path(__file__).parent / "bin"), os.environ.get("PENDULA_PYTHON") or sys.executable
 
 
 def warn(
     sentences: list[str], stacklevel: int, names: Mapping[str, str] | None = None, in_file: bool = False
 ) -> None:
-    """Each is a TrustWarning at who called pendula, about arguments, or about keys of a file."""
+    """Issues each sentence as a TrustWarning at the caller of pendula, about arguments or keys of a file."""
     for sentence in sentences:
         told = sentence if in_file else in_arguments(sentence, names)
         warnings.warn(told, TrustWarning, stacklevel=stacklevel)
 
 
 def mapping(name: str, given: object) -> dict[str, Any]:
-    """What was given by names. Raises InputError."""
+    """A mapping with names as keys; None is an empty one. Raises InputError."""
     if given is None:
         return {}
     if not isinstance(given, Mapping):
@@ -120,7 +120,7 @@ def mapping(name: str, given: object) -> dict[str, Any]:
 
 
 def merged(name: str, given: object, more: Mapping[str, object]) -> dict[str, Any]:
-    """The same with keyword arguments, none of which may be there already."""
+    """The same with keyword arguments added; none may be given twice."""
     found = mapping(name, given)
     for key in more:
         if key in found:
@@ -144,7 +144,7 @@ SCIPY = {  # words of SciPy, and ours
 
 
 def unknown(where: str, given: str, known: Iterable[str]) -> _core.InputError:
-    """What to say of a keyword that nobody knows."""
+    """The error for an unknown keyword."""
     told = f"{where}: unknown keyword {given}"
     if given in SCIPY:
         return _core.InputError(f"{told}: here it is {SCIPY[given]}")
@@ -153,13 +153,13 @@ def unknown(where: str, given: str, known: Iterable[str]) -> _core.InputError:
 
 
 def did_you_mean(given: str, names: Iterable[str]) -> str:
-    """The nearest names; empty where none is near."""
+    """A hint with the nearest names; empty if none is near."""
     near = difflib.get_close_matches(given, list(names), 2)
     return f"; did you mean {' or '.join(near)}?" if near else ""
 
 
 def require_known(where: str, given: Iterable[str], known: Iterable[str], hint: str = "") -> None:
-    """Raises InputError on a name that is none of those; where none is near, with the hint."""
+    """Raises InputError for an unknown name, with near names or else the hint."""
     names = list(known)
     for name in given:
         if name not in names:
@@ -170,21 +170,21 @@ def require_known(where: str, given: Iterable[str], known: Iterable[str], hint: 
 
 
 def columns_of(name: str, columns: Sequence[str]) -> list[str]:
-    """A column by its name; by one without an index those of all links. None where there is no such column."""
+    """The column of a name; for a name without an index those of all links. Empty if there is none."""
     if name in columns:
         return [name]
     return [column for column in columns if re.fullmatch(re.escape(name) + r"_\d+", column)]
 
 
 def missing(extra: str, error: ImportError) -> ImportError:
-    """What to say where an optional package is not installed."""
+    """The error for an optional package that is not installed."""
     return ImportError(
         f'pendula: expected {error.name}, which pip install "pendula[{extra}]" brings, got none'
     )
 
 
 def number(name: str, given: object) -> float:
-    """A finite number that is one. Raises InputError."""
+    """A finite number; booleans and texts are none. Raises InputError."""
     if isinstance(given, (int, float, np.integer, np.floating)) and not isinstance(given, bool):
         found = float(given)
         if math.isfinite(found):
@@ -203,7 +203,7 @@ def quantity(name: str, given: object, info: _core.Prepared | _core.ModelInfo, o
 
 
 def positive(name: str, given: object) -> float:
-    """The same of one > 0."""
+    """The same for a number > 0."""
     found = number(name, given)
     if found <= 0:
         raise _core.InputError(f"{name}: expected a number > 0, got {given!r}")
@@ -211,14 +211,14 @@ def positive(name: str, given: object) -> float:
 
 
 def whole(name: str, given: object, least: int) -> int:
-    """Raises InputError on what is no whole number, or less."""
+    """A whole number that is at least ``least``. Raises InputError."""
     if isinstance(given, (int, np.integer)) and not isinstance(given, bool) and given >= least:
         return int(given)
     raise _core.InputError(f"{name}: expected a whole number >= {least}, got {given!r}")
 
 
 def duration_of(given: object, made: _core.Prepared) -> float:
-    """In s. Raises InputError."""
+    """A duration in s. Raises InputError."""
     found = quantity("duration", given, made)
     if found < 0:
         raise _core.InputError(f"duration: expected a number, not negative, got {given!r}")
@@ -226,7 +226,7 @@ def duration_of(given: object, made: _core.Prepared) -> float:
 
 
 def arrayed(name: str, given: object) -> object:
-    """An array of another package as NumPy's, if that package lends it by DLPack alone. Raises InputError."""
+    """Converts an array of another package to NumPy, if only DLPack can. Raises InputError for masked arrays."""
     if isinstance(given, np.ma.MaskedArray):
         raise _core.InputError(f"{name}: expected an array without a mask, got one with a mask")
     is_lent = hasattr(given, "__dlpack__") and not hasattr(given, "__array__")
@@ -245,13 +245,13 @@ def numbers(name: str, given: object) -> NDArray[np.float64]:
 
 
 def in_order(columns: list[str], state: Sequence[int]) -> list[int]:
-    """Places of the time, of coordinates and rates in the order of all states, and of what else a row has."""
+    """Indices of the time, of coordinates and rates in the order of states, and of the other columns of a row."""
     first = dict.fromkeys([0, *state])
     return [*first, *(k for k in range(len(columns)) if k not in first)]
 
 
 def state_names(made: _core.Prepared) -> list[str]:
-    """What the numbers of a state are: coordinates, then their rates."""
+    """Names of the numbers of a state: coordinates, then their rates."""
     columns = made.columns
     return [columns[k] for k in made.state]
 

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 
 class Scenario:
-    """A scenario file, as the command line runs it.
+    """A scenario file, run as by the command line.
 
     Parameters
     ----------
@@ -41,7 +41,7 @@ class Scenario:
         return f"Scenario({str(self.file)!r})"
 
     def run(self, *, progress: bool | None = None) -> Solution:
-        """Runs it; as :meth:`Chain.simulate`, and to the bit as ``pendula simulate``."""
+        """Runs the scenario, as :meth:`Chain.simulate`; equal to ``pendula simulate`` to the last bit."""
         text = self.file.read_text(encoding="utf-8")
         with bar(None, progress) as told, plainly():
             result = _core.simulate(text, str(self.file), self._overrides, [], told, *places(), tell)
@@ -57,8 +57,8 @@ class Scenario:
         client: Any = None,
         progress: bool = False,
     ) -> xarray.Dataset:
-        """Moves all members of a scenario with ``[ensemble]``; as :func:`ensemble`, and to the bit as ``pendula
-        ensemble``."""
+        """Moves all members of a scenario with ``[ensemble]``, as :func:`ensemble`; equal to ``pendula ensemble`` to
+        the last bit."""
         return move_members(
             self.file.read_text(encoding="utf-8"),
             str(self.file),

@@ -47,17 +47,17 @@ RUN_OPTIONS = ("method", "stages", "form", "solver", "iteration")
 
 
 class Beginning(NamedTuple):
-    """What a simulation begins with, as it is pickled."""
+    """The beginning of a simulation, as it is pickled."""
 
     scenario: str
-    unforced: str  # the same with no constant parts of inputs
+    unforced: str  # the same without constant parts of inputs
     remember: bool
     model_file: str | None
     model_hash: str | None
 
     @property
     def system(self) -> str:
-        """The name of the table that says what moves."""
+        """The name of the table of the system."""
         return "chain" if self.scenario.startswith("[chain]") else "system"
 
     @property
@@ -93,7 +93,7 @@ class Beginning(NamedTuple):
         )
 
     def prepare(self) -> _core.Prepared:
-        """Raises InputError, too, if a model is not what it was."""
+        """The prepared run. Raises InputError, also if the model file has changed."""
         if self.model_file is not None and _hash(self.model_file) != self.model_hash:
             raise InputError(f"{self.model_file}: expected the model that was pickled, got another one")
         with plainly():
@@ -107,13 +107,13 @@ def _hash(file: object) -> str | None:
         with open(str(file), "rb") as text:
             return hashlib.sha256(text.read()).hexdigest()
     except OSError:
-        return None  # the reader of scenarios says what is wrong
+        return None  # the reader of scenarios reports the error
 
 
 def split(
     where: Callable[..., object], system: System, start: object, given: Mapping[str, object]
 ) -> tuple[dict[str, object], dict[str, object]]:
-    """A start, and options of a run, from keywords of ``where``. Raises InputError on one that is neither."""
+    """Splits keywords of ``where`` into a start and options of a run. Raises InputError for any other."""
     runs = {name: one for name, one in given.items() if name in RUN_OPTIONS}
     more = {name: one for name, one in given.items() if name not in runs}
     options = [*RUN_OPTIONS, *(where.__kwdefaults__ or ())]
@@ -122,18 +122,18 @@ def split(
 
 
 class Simulation:
-    """A motion that goes on as far as it is asked to.
+    """A motion that is advanced call by call.
 
     Parameters
     ----------
     system : Chain or Model
-        Held inputs replace what is constant of them; drives are added.
+        Held inputs replace the constant parts of its inputs; drives are added.
     start : mapping, optional
         As for :meth:`Chain.simulate`.
     tolerance, step : float, optional
-        Steps of its own choice, to a tolerance of 1e-9 unless told otherwise; or constant ones, in s.
+        Adaptive steps, by default with a tolerance of 1e-9; or constant steps, in s.
     remember : bool
-        Whether earlier steps are kept, for :meth:`at`; so many numbers a step as the state has.
+        Whether earlier steps are kept, for :meth:`at`. Each takes the memory of a state.
     method, stages, form, solver, iteration
         As ``[run]`` of a scenario.
 
@@ -146,8 +146,8 @@ class Simulation:
 
     Notes
     -----
-    Copies and pickles go on as the first does, to the bit; pickles forget earlier steps. Nobody looks at the motion
-    again to see how far it can be trusted: :meth:`Chain.simulate` does. One thread at a time may use it.
+    Copies and pickles go on as the original does, to the last bit; pickles forget earlier steps. The accuracy of the
+    motion is not checked by a second run, as :meth:`Chain.simulate` does. One thread at a time may use a simulation.
 
     Examples
     --------
@@ -180,7 +180,7 @@ class Simulation:
         with plainly():
             self._core = _core.Simulation(self._made)
             self._inputs = self._made.inputs
-        self._holds = {self._core.time: self._core.held}  # from when on what was held, for record
+        self._holds = {self._core.time: self._core.held}  # inputs by the time since which they are held
 
     @contextmanager
     def _alone(self) -> Iterator[None]:
@@ -194,19 +194,19 @@ class Simulation:
 
     @property
     def time(self) -> float:
-        """In s."""
+        """The present time, in s."""
         with self._alone():
             return self._core.time
 
     @property
     def steps(self) -> int:
-        """Steps that were taken; of a pickle since then."""
+        """Number of steps so far; for an unpickled simulation, those since then."""
         with self._alone():
             return self._core.steps
 
     @property
     def names(self) -> list[str]:
-        """What the numbers of the state are: coordinates, then their rates; of a chain all theta, then all phi."""
+        """Names of the numbers of the state: coordinates, then their rates; for a chain all theta, then all phi."""
         return state_names(self._made)
 
     @property
@@ -217,7 +217,7 @@ class Simulation:
 
     @property
     def inputs(self) -> dict[str, float]:
-        """What is held, by name; drives are added to it."""
+        """The held inputs by name; drives are added to them."""
         with self._alone():
             return dict(zip(self._inputs, self._core.held, strict=True))
 
@@ -228,15 +228,15 @@ class Simulation:
         return [columns[k] for k in in_order(columns, self._made.state)]
 
     def __getitem__(self, column: str) -> float:
-        """A number of the row where it is: ``simulation["x_2"]``, ``simulation["energy"]``."""
+        """A number of the row at the present time: ``simulation["x_2"]``, ``simulation["energy"]``."""
         if not isinstance(column, str):
             raise InputError(f"column: expected a name, got {column!r}")
         with self._alone():
             return self._core.number(column)
 
     def hold(self, inputs: Inputs | None = None, **more: float | str) -> Simulation:
-        """Holds inputs from now on, until others are held; ``torque`` is that of all links. Raises InputError, and then
-        holds what it did."""
+        """Holds inputs from now on, until others are held; ``torque`` is that of all links. Raises InputError, and
+        changes nothing then."""
         given = {
             column: one
             for name, one in merged("inputs", inputs, more).items()
@@ -253,7 +253,7 @@ class Simulation:
         return self
 
     def advance_to(self, time: float | str) -> Simulation:
-        """Goes on to ``time``, in s, where a step ends. Raises RunFailed where the mathematics fails."""
+        """Advances to ``time``, in s, where a step ends. Raises RunFailed if the computation fails."""
         end = quantity("time", time, self._made)
         with self._alone():
             self._core.advance_to(end)
@@ -267,10 +267,10 @@ class Simulation:
         /,
         **more: float | str,
     ) -> Simulation:
-        """Holds inputs, and goes on by ``duration``, in s: a zero-order hold, with steps chosen inside. Numbers may
-        have units: ``step("10 ms", push="100 mN")``.
+        """Holds inputs, and advances by ``duration``, in s: a zero-order hold, with the method's own steps inside.
+        Numbers may have units: ``step("10 ms", push="100 mN")``.
 
-        ``inputs`` may be a function of the time and the state, which gives inputs by name: it is called every
+        ``inputs`` may be a function of the time and the state that returns inputs by name: it is called every
         ``sample`` seconds, or once. For a law that is an expression of the columns, see ``feedback`` of the system.
 
         >>> import pendula
@@ -306,8 +306,8 @@ class Simulation:
     ) -> Solution:
         """The whole motion up to now as a run: rows, page, plots and events, with the inputs that were held.
 
-        The run is made again for it, with these inputs as signals: by steps of the same size or tolerance, which end
-        where inputs changed, not where every call did. It says how far it can be trusted.
+        The run is repeated for it, with these inputs as signals: by steps of the same size or tolerance, which end
+        where inputs changed, not at the end of every call. The run has an estimate of its error.
 
         Parameters
         ----------
@@ -349,7 +349,7 @@ class Simulation:
         return concluded(result, names)
 
     def _signals(self) -> list[dict[str, object]]:
-        """Tables of what was held."""
+        """Tables of signals for the inputs that were held."""
         times, values = [*self._holds], np.array([*self._holds.values()])
         return [
             {"input": name, "times": times, "values": held.tolist(), "hold": True}
@@ -358,10 +358,10 @@ class Simulation:
         ]
 
     def linearize(self, outputs: Outputs | None = None) -> LinearSystem:
-        """The linear system d(q, v)/dt = A (q, v) + B inputs beside where it is, exactly; ``outputs`` are those of
+        """The exact linearisation d(q, v)/dt = A (q, v) + B inputs at the present state; ``outputs`` are those of
         :func:`linearize`.
 
-        Raises InputError where the equations are singular, as in space at a pole, where phi has no meaning; and
+        Raises InputError if the equations are singular, as in space at a pole, where phi is undefined; and
         RuntimeError for a chain of more links than this build has kernels for.
         """
         with self._alone():
@@ -374,11 +374,11 @@ class Simulation:
         return LinearSystem(*found, step=None, **self._seen(outputs))
 
     def _seen(self, outputs: Outputs | None) -> dict[str, Any]:
-        """C and D where it is, and what all numbers of a linear system are."""
+        """C and D at the present state, and the names of all numbers of a linear system."""
         return seen(self._made, outputs, self.time, self.state, list(self.inputs.values()))
 
     def copy(self) -> Simulation:
-        """One that goes on as this one does, to the bit."""
+        """A simulation that goes on as this one does, to the last bit."""
         other = Simulation.__new__(Simulation)
         other._lock = threading.Lock()
         other._text, other._made, other._inputs = self._text, self._made, self._inputs
@@ -411,11 +411,11 @@ class Lyapunov(NamedTuple):
     """Lyapunov exponents of a motion, in 1/s."""
 
     exponents: NDArray[np.float64]  #: descending
-    errors: NDArray[np.float64]  #: infinite where the run was too short to tell
-    sum: float  #: of all of them the mean divergence
-    duration: float  #: that was run, in s
+    errors: NDArray[np.float64]  #: infinite if the run was too short
+    sum: float  #: of the exponents; for a whole spectrum the mean divergence
+    duration: float  #: of the run, in s
     ftle: float  #: finite-time exponent of one tangent
-    megno: float  #: 2 where motion is regular
+    megno: float  #: 2 for regular motion
 
 
 def lyapunov(

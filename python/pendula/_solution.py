@@ -1,4 +1,4 @@
-"""Solutions: what comes of runs."""
+"""Solutions: the results of runs."""
 
 from __future__ import annotations
 
@@ -33,24 +33,24 @@ class Solution:
     t : (rows,) array
         Times, in s.
     y : (coordinates + rates, rows) array
-        Coordinates, then their rates, in the order of ``names``: of a chain all theta, then all phi.
+        Coordinates, then their rates, in the order of ``names``: for a chain all theta, then all phi.
     names : list of str
-        What the rows of ``y`` are; the order of :attr:`Simulation.state` and of :func:`linearize`, too.
+        Names of the rows of ``y``; :attr:`Simulation.state` and :func:`linearize` have the same order.
     t_events, y_events : dict of arrays
         Times (events,) and states (events, coordinates + rates) of each event, by its name.
     status : int
-        0: came to its end; 1: an event ended it; -1: it failed.
+        0: the run reached its end; 1: an event ended it; -1: it failed.
     message : str
     success : bool
     summary : dict
         As ``pendula simulate --json``: method, steps, energy error, warnings and more.
     columns, units : list of str
-        Of all numbers that a row has, the time first, then those of ``names``: ``run["theta_1"]``; ``run["theta"]`` of
-        all links is (links, rows). Chains have another order in files, link by link.
+        Names and units of all numbers of a row, the time first, then those of ``names``: ``run["theta_1"]``;
+        ``run["theta"]`` has all links, (links, rows). Files of chains have another order, link by link.
 
     Notes
     -----
-    Arrays are read-only. An event at the very start or end of the run is none.
+    Arrays are read-only. A zero at the very start or end of the run does not count as an event.
     """
 
     def __init__(self, result: _core.Result, summary: dict[str, Any] | None = None) -> None:
@@ -102,7 +102,7 @@ class Solution:
     def sol(self, t: ArrayLike) -> NDArray[np.float64]:
         """The motion at any times of the run, in any order, at the full order of the method.
 
-        The run is made again for it, by the same steps: from its start to its end, also where rows are fewer.
+        The run is repeated for it, by the same steps, from its start to its end.
 
         Parameters
         ----------
@@ -132,12 +132,12 @@ class Solution:
             return _core.rows_at(self._result, (times - self._result.begin).tolist(), *places(), tell)
 
     def _span(self) -> tuple[float, float]:
-        """From the start of the motion to its end, which rows at times need not reach."""
+        """Start and end of the motion. Rows at given times need not reach its end."""
         last = float(self.t[-1]) if self.t.size else self._result.begin
         return self._result.begin, max(last, self.summary.get("final", {}).get("t", last))
 
     def go_on(self, duration: float, *, progress: bool | None = None) -> Solution:
-        """The same run to a later end, by its method and its steps: to the bit what it would have been with these.
+        """The same run to a later end, by its method and its steps: equal, to the last bit, to a run in one go.
 
         Parameters
         ----------
@@ -154,7 +154,7 @@ class Solution:
         Raises
         ------
         InputError
-            The run is further already; or it was made by another version of pendula, or on another instruction set.
+            The run is longer already; or it was made by another version of pendula, or on another instruction set.
 
         Examples
         --------
@@ -172,19 +172,19 @@ class Solution:
     def save(self, file: str | PathLike[str]) -> None:
         """Writes the rows: CSV, or a run file (HDF5) that ends in .h5, .hdf5 or .nc.
 
-        A run file has names and units, the scenario, events, and the place from which the run can go on:
+        A run file has names and units, the scenario, events, and a checkpoint from which the run can go on:
         :func:`pendula.open`, ``pendula plot``, ``pendula simulate --resume``, xarray and netCDF read it.
 
         Raises
         ------
         InputError
-            It cannot be opened; OSError where it cannot be written.
+            The file cannot be opened; OSError if it cannot be written.
         """
         with plainly():
             _core.save(self._result, fspath(file))
 
     def to_netcdf(self, file: str | PathLike[str]) -> None:
-        """Writes a run file, as :meth:`save`: it is a netCDF file."""
+        """Writes a run file, as :meth:`save`: run files are netCDF files."""
         if not fspath(file).endswith((".nc", ".h5", ".hdf5")):
             raise _core.InputError(
                 f"file: expected a name that ends in .nc, .h5 or .hdf5, got {fspath(file)}"
@@ -192,15 +192,15 @@ class Solution:
         self.save(file)
 
     def to_html(self, file: str | PathLike[str]) -> None:
-        """Writes the page that ``pendula simulate --view`` writes: one file that moves, and needs nothing else.
+        """Writes the page that ``pendula simulate --view`` writes: one file with the moving picture and plots.
 
-        The run is made again for it, by the same steps. The program's page also carries the laboratory.
+        The run is repeated for it, by the same steps. The page that the program writes also has the laboratory.
         """
         with plainly():
             _core.write_page(self._result, fspath(file), *places(), tell)
 
     def _repr_html_(self) -> str | None:
-        """The page in a notebook, if the run is not one of more than a few seconds; :meth:`to_html` writes that."""
+        """The page for a notebook, if the run took no more than a few seconds; else use :meth:`to_html`."""
         if not self.summary.get("wall_seconds", inf) < 5 or self.t.size == 0:
             return None
         with TemporaryDirectory() as folder:
@@ -221,20 +221,20 @@ class Solution:
             Solution.__init__(self, opened(file), state["summary"])
 
     def gradient(self, by_end: ArrayLike) -> Gradient:
-        """What a number that depends on where the run ends changes by.
+        """The gradient of a number that depends on the states of the run.
 
-        The run is made again for it, forth and back, by steps that end at the rows that are asked for. Their times
-        are held, also that of an event that ended the run.
+        The run is repeated for it, forward and backward, by steps that end at the rows in question. The times of
+        rows are held fixed, also that of an event that ended the run.
 
         Parameters
         ----------
         by_end : (coordinates + rates,) or (coordinates + rates, rows) array_like
-            The number's gradient by the state of the last row, or by those of all, in the order of ``names``.
+            The number's gradient by the state of the last row, or by the states of all rows, in the order of ``names``.
 
         Returns
         -------
         Gradient
-            By the start, by parameters and by inputs.
+            With respect to the start, parameters and inputs.
 
         Raises
         ------
@@ -261,8 +261,8 @@ class Solution:
 
     @property
     def nfev(self) -> int:
-        """Iterations on the stages of implicit steps, which evaluate the equations at all of them; of other methods,
-        steps that were tried."""
+        """Number of iterations on the stages of implicit steps, each an evaluation at all stages; for other methods
+        the number of tried steps."""
         return int(self._told("newton_iterations") or self._told("steps") + self._told("rejected_steps"))
 
     @property
@@ -272,7 +272,7 @@ class Solution:
 
     @property
     def nsteps(self) -> int:
-        """Steps that were taken."""
+        """Number of steps."""
         return int(self._told("steps"))
 
     def _told(self, key: str) -> Any:
@@ -290,17 +290,17 @@ class Solution:
     def plot(self, *names: str, axes: Axes | None = None, label: str | None = None) -> Axes:
         """Draws columns over time with matplotlib; without names, some coordinates.
 
-        Columns of one unit share a panel. Where a run takes no more than a few seconds it is made again, by the same
-        steps, for as many points as a picture can show.
+        Columns of one unit share a panel. A run that takes no more than a few seconds is repeated, by the same steps,
+        for as many points as a picture can show.
 
         Parameters
         ----------
         *names : str
             Columns; without an index, of all links.
         axes : matplotlib Axes, optional
-            To draw in, beside what is there; for columns of one unit.
+            Axes to draw into, beside what is there; for columns of one unit.
         label : str, optional
-            What the legend calls this run.
+            The name of this run in the legend.
 
         Returns
         -------
@@ -327,7 +327,7 @@ class Solution:
         )
 
     def _fine_rows(self) -> NDArray[np.float64]:
-        """Rows close enough for a picture, if they can be made in a few seconds; else those that there are."""
+        """Rows dense enough for a picture, if a run of a few seconds gives them; else the present ones."""
         quick = self.summary.get("wall_seconds", inf) < 5
         if not quick or not 2 <= self.t.size < _pictures.POINTS or not self.t[-1] > self.t[0]:
             return self._rows
@@ -336,19 +336,19 @@ class Solution:
             times = np.union1d(times, more[: _pictures.POINTS])
         try:
             rows = self._rows_at(times[(times >= self.t[0]) & (times <= self.t[-1])])
-        except _core.InputError:  # of a file that another build has made
+        except _core.InputError:  # the run is from a file of another build
             return self._rows
         return rows if len(rows) else self._rows
 
     def animate(self, *, seconds: float | None = None, fps: int = 30) -> FuncAnimation:
         """A matplotlib animation of the points, in the plane or in space, in a figure of its own.
 
-        The run is made again for it, by the same steps.
+        The run is repeated for it, by the same steps.
 
         Parameters
         ----------
         seconds : float, optional
-            How long it takes to look at; left out, as long as the motion.
+            Duration of the animation; by default that of the motion.
         fps : int
             Frames a second.
 
@@ -364,7 +364,7 @@ class Solution:
         )
 
     def to_xarray(self) -> xarray.Dataset:
-        """All columns by name over ``t``, with their units: those of links over ``link``, too, counted from 1.
+        """All columns by name over ``t``, with their units; columns of links are also over ``link``, from 1.
 
         >>> import pendula
         >>> run = pendula.Chain(links=2).simulate(1.0, theta=1.0).to_xarray()
@@ -391,7 +391,7 @@ class Solution:
         return xarray.Dataset(data, coords=scales)
 
     def _columns_of_links(self) -> dict[str, list[str]]:
-        """theta_1, theta_2, … by theta; only of names that go through all links."""
+        """Columns by name without index: theta_1, theta_2, … by theta; only if there is one for each link."""
         found: dict[str, list[str]] = {}
         for name in self.columns:
             stem = re.sub(r"_\d+$", "", name)
@@ -409,7 +409,7 @@ class Solution:
 def concluded(
     result: _core.Result, names: Mapping[str, str] | None = None, in_file: bool = False
 ) -> Solution:
-    """The solution of a run that the caller's caller has just made, with its warnings. Raises RunFailed."""
+    """The solution of a run; issues its warnings at the caller's caller. Raises RunFailed."""
     solution = Solution(result)
     warn(solution.summary["warnings"], 4, names, in_file)
     if solution.status < 0:
@@ -423,14 +423,14 @@ def opened(file: str | PathLike[str]) -> _core.Result:
 
 
 def open(file: str | PathLike[str]) -> Solution:
-    """The solution in a run file, of :meth:`Solution.save` or of ``pendula simulate -o run.h5``.
+    """Reads the solution in a run file, from :meth:`Solution.save` or ``pendula simulate -o run.h5``.
 
-    A run that was cut off, or is still going on, has the rows up to there, ``status`` -1 and an empty ``summary``.
+    A run that was interrupted, or is still running, has the rows so far, ``status`` -1 and an empty ``summary``.
 
     Raises
     ------
     InputError
-        It is no run file, or it is damaged.
+        The file is no run file, or it is damaged.
 
     Examples
     --------

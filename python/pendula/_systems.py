@@ -1,4 +1,4 @@
-"""What moves: what all systems have in common, and chains."""
+"""Systems: their common base class, and chains."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def tables_of(name: str, given: object) -> list[dict[str, object]]:
 
 
 def system_of(given: object) -> System:
-    """Raises InputError on what is no system; of a function of ``pendula.model`` it says how to make one."""
+    """A system. Raises InputError for anything else; for a result of ``pendula.model`` it says how to make one."""
     if isinstance(given, System):
         return given
     name, kind = getattr(given, "__name__", None), type(given).__name__
@@ -61,7 +61,7 @@ def ascending_times(given: object) -> NDArray[np.float64]:
 
 
 def span_of(where: str, duration: Any, t: object) -> tuple[NDArray[np.float64] | None, Any]:
-    """Times of rows where they are given, and a duration: the last of them where none is."""
+    """Times of rows, if given, and a duration, by default the last of these times."""
     times = None if t is None else times_of(t)
     if duration is None and times is None:
         raise TypeError(f"{where}: expected duration= or t=, got neither")
@@ -75,29 +75,29 @@ def starts_of(
     more: Mapping[str, object],
     options: Iterable[str] = (),
 ) -> dict[str, Any]:
-    """A start by a mapping, by keywords, or both. Raises InputError on a keyword that is none of it; ``options`` are
-    further keywords, which may have been meant."""
+    """A start from a mapping, keywords, or both. Raises InputError for other keywords; ``options`` are further keywords
+    that may have been meant."""
     if more:
         known = system_of(system).start_names()
         for name in more:
             if (
                 re.sub(r"(_\d+)_dot$", r"_dot\1", name) not in known
-            ):  # of theta_1_dot, an older name, the present one
+            ):  # the present name for an older one, theta_1_dot
                 raise unknown(where, name, [*known, *options])
     return merged("start", start, more)
 
 
 class System(ABC):
-    """What chains and models have in common: how they are run.
+    """The common base class of chains and models, which runs them.
 
-    Systems are equal that move alike: those of the same kind, with the same numbers.
+    Systems are equal if they are of the same kind and have the same numbers.
     """
 
     _signals: Signals
 
     @abstractmethod
     def tables(self) -> Tables:
-        """Those of a scenario that say what moves."""
+        """The tables of a scenario for this system."""
 
     @property
     @abstractmethod
@@ -116,7 +116,7 @@ class System(ABC):
 
     @property
     def units(self) -> dict[str, str]:
-        """Of coordinates, rates, inputs and parameters, by name."""
+        """Units of coordinates, rates, inputs and parameters, by name."""
         known = self._info.units
         return {
             name: known[name] for name in (*self.coordinates, *self.rates, *self.inputs, *self.parameters)
@@ -125,7 +125,7 @@ class System(ABC):
     @cached_property
     @abstractmethod
     def _info(self) -> _core.Prepared | _core.ModelInfo:
-        """What the program knows of it."""
+        """The description of the system by the program."""
 
     @property
     @abstractmethod
@@ -134,24 +134,24 @@ class System(ABC):
 
     @abstractmethod
     def start_names(self) -> list[str]:
-        """What a start may name."""
+        """Names that a start may have."""
 
     def _require_right(self, tables: Tables, names: Mapping[str, str] | None = None) -> None:
-        """Raises InputError where arguments are wrong: here, where they are given."""
+        """Raises InputError for wrong arguments, when they are given, not when the system moves."""
         text = _toml.document({**tables, "start": self.at_zero(), "run": {"duration": 1.0}})
         try:
             with plainly(names):
                 _core.check(text, *places(), tell)
         except InputError as error:
-            if not str(error).startswith("start:"):  # a system may have no start where all is zero
+            if not str(error).startswith("start:"):  # a system may be singular where all coordinates are 0
                 raise
 
     def _tables_over_time(self) -> dict[str, str]:
-        """What signals are called where they are arguments."""
+        """Names of signals as arguments."""
         return {f"signal[{k + 1}]": f"inputs.{name}" for k, name in enumerate(self._signals)}
 
     def __getstate__(self) -> dict[str, Any]:
-        """Without what is found out again: for pickles, and for copies, which get other numbers."""
+        """The state without cached values: for pickles, and for copies, which get other numbers."""
         return {name: one for name, one in vars(self).items() if name != "_info"}
 
     def __eq__(self, other: object) -> bool:
@@ -169,14 +169,14 @@ class System(ABC):
         return {}
 
     def model_file(self) -> Path | None:
-        """The file that says what moves, if one does."""
+        """The file of the model, if there is one."""
         return None
 
     @abstractmethod
     def replaced(
         self, parameters: Mapping[str, NDArray[np.float64]], inputs: Mapping[str, NDArray[np.float64]]
     ) -> System:
-        """The same system with other values of parameters, and of what is constant of inputs."""
+        """The same system with other parameters and constant parts of inputs."""
 
     @abstractmethod
     def unforced(self) -> System:
@@ -214,9 +214,9 @@ class System(ABC):
         Parameters
         ----------
         duration : float, optional
-            How long, in s, or as ``"1 min"``. Left out, the last of the times ``t``.
+            In s, or as a text ``"1 min"``. By default the last of the times ``t``.
         t : array_like, optional
-            Times of the rows, in s, increasing from 0 on. Left out, there is a row every ``every`` steps, or every
+            Times of the rows, in s, increasing from 0 on. By default there is a row every ``every`` steps, or every
             ``interval`` seconds; without these, some hundreds or a few thousand evenly in time, and the last state.
         start : mapping, optional
             Coordinates and rates at the start by name, as keyword arguments: ``theta="90 deg"``, ``theta_dot=[0, 1]``.
@@ -228,16 +228,16 @@ class System(ABC):
             has it (with its attributes ``terminal`` and ``direction``), is only called at a fixed number of times in
             each step: if its sign changes twice between two of them, both changes are missed.
         inputs : mapping, optional
-            Of inputs, in place of what they have: numbers, which are held, or tables of numbers over time, as
-            :class:`Model` takes them: ``{"push": (times, values)}``. Of a chain tables of ``torque_1`` … alone.
+            Values of inputs, in place of the system's own: numbers, which are held, or tables of numbers over time, as
+            for :class:`Model`: ``{"push": (times, values)}``. For a chain only tables of ``torque_1`` ….
         method, stages, form, solver, iteration, step, tolerance, accuracy, estimate
-            As ``[run]`` of a scenario (``pendula help scenario``). Steps are chosen for an accuracy of 1e-9 unless one
-            of ``accuracy``, ``tolerance`` and ``step`` says otherwise.
+            As ``[run]`` of a scenario (``pendula help scenario``). Without ``accuracy``, ``tolerance`` and ``step``,
+            steps are chosen for an accuracy of 1e-9.
 
         columns : mapping, optional
             Expressions of the columns as further columns, by name: ``{"height": "1 - cos(theta_1)"}``.
         progress : bool, optional
-            Whether a bar (of tqdm) is shown where a run takes more than a second; left out, where somebody looks.
+            Whether a bar (of tqdm) is shown for a run of more than a second; by default on terminals and in notebooks.
 
         Returns
         -------
@@ -246,14 +246,14 @@ class System(ABC):
         Raises
         ------
         InputError
-            An argument is wrong; the message names it, what was expected and what was got.
+            An argument is wrong; the message names it, and says what was expected and what was given.
         RunFailed
             The computation failed; ``partial`` is the solution up to there.
 
         Warns
         -----
         TrustWarning
-            How far the rows can be trusted, where that is less than was asked for.
+            The rows are less accurate than was asked for; the message says by how much.
         """
         begin = starts_of("simulate", self, start, starts, System.simulate.__kwdefaults__ or ())
         times, duration = span_of("simulate", duration, t)
@@ -291,7 +291,7 @@ class System(ABC):
 
 
 def _depth(given: object) -> int:
-    """Axes of an array, which need not be a right one: 1 of a list that is ragged."""
+    """Number of axes of an array; 1 for a ragged list."""
     try:
         return np.ndim(given)  # type: ignore[arg-type]
     except ValueError:
@@ -307,7 +307,7 @@ class Chain(System):
         Of each link, in kg and m; a single number stands for every link.
     space : {"planar", "spatial"}
     links : int, optional
-        Needed where no array tells it.
+        Needed if no array has the number of links.
     gravity : float
         In m/s².
     damping, torque : float or array_like, optional
@@ -354,7 +354,7 @@ class Chain(System):
         self._signals: Signals = {}
         if self._tells_links():
             self._require_right(self.tables())
-        else:  # a start tells how many there are
+        else:  # a start will tell the number of links
             self._require_right({"chain": {**self._numbers, "links": 1}})
 
     def _tells_links(self) -> bool:
@@ -381,17 +381,17 @@ class Chain(System):
 
     @property
     def links(self) -> int:
-        """How many. Raises InputError, as all that follows, where only a start would tell."""
+        """Number of links. Raises InputError, as all that follows, if only a start would tell it."""
         return len(self.coordinates) // (2 if self._numbers["space"] == "spatial" else 1)
 
     @property
     def masses(self) -> NDArray[np.float64]:
-        """Of each link, in kg."""
+        """Masses of the links, in kg."""
         return self._per_link("masses")
 
     @property
     def lengths(self) -> NDArray[np.float64]:
-        """Of each link, in m."""
+        """Lengths of the links, in m."""
         return self._per_link("lengths")
 
     @property
@@ -413,7 +413,7 @@ class Chain(System):
 
     @property
     def parameters(self) -> dict[str, object]:
-        """Parameters by name; of each link an array."""
+        """Parameters by name; those of links are arrays."""
         return {
             "gravity": self._numbers["gravity"],
             **{name: self._per_link(name) for name in ("masses", "lengths", "damping")},

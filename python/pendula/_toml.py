@@ -14,7 +14,7 @@ from ._runs import arrayed
 
 
 def value(given: object, key: str) -> str:
-    """One value in TOML. Raises InputError, with the key, on what has no form there."""
+    """One value in TOML. Raises InputError, with the key, for a value that TOML cannot have."""
     if isinstance(given, (bool, np.bool_)):
         return "true" if given else "false"
     if isinstance(given, (int, np.integer)):
@@ -42,7 +42,7 @@ def value(given: object, key: str) -> str:
 
 
 def _text(given: str) -> str:
-    """A basic string; TOML knows no surrogates, which JSON would make of what is beyond 16 bits."""
+    """A basic string. TOML has no surrogates, into which JSON would escape characters beyond 16 bits."""
     return json.dumps(given, ensure_ascii=False).replace("\x7f", "\\u007F")
 
 
@@ -51,7 +51,7 @@ def _key(name: str) -> str:
 
 
 def document(tables: Mapping[str, Mapping[str, object] | Sequence[Mapping[str, object]]]) -> str:
-    """A whole document; a sequence of tables becomes ``[[name]]``. What is None is left out."""
+    """A whole document; a sequence of tables becomes ``[[name]]``. Values that are None are left out."""
     lines: list[str] = []
 
     def table(name: str, heading: str, keys: Mapping[str, object]) -> None:

@@ -7,26 +7,27 @@
 >>> observation.shape
 (8,)
 
-What all environments have in common:
+All environments have in common:
 
 action
-    One number from -1 to 1 for each motor, times the largest force or torque; what is beyond is cut off. It is held for
-    ``step`` seconds, while pendula chooses steps of its own, to ``tolerance``.
+    One number from -1 to 1 for each motor, times the largest force or torque; larger numbers are clipped. It is held
+    for ``step`` seconds, in which pendula takes adaptive steps, by ``tolerance``.
 observation
-    Coordinates that are no angles, the sines of the angles, their cosines, the rates. Angles are from hanging down, of
-    each link by itself. All are within the observation space: what has left it ends the episode, and its last
-    observation is cut off. ``info["state"]`` has coordinates and rates as they are, in 64 bits.
+    Coordinates that are no angles, the sines of the angles, their cosines, the rates. The angle of each link is from
+    the downward vertical. All are within the observation space: a state outside ends the episode, and its observation
+    is clipped. ``info["state"]`` has coordinates and rates as they are, in 64 bits.
 reward
     (1 + h) / 2 of each step, where h is the height of the last bob over the pivot, divided by the length of all links:
     0 where the chain hangs, 1 where it stands.
 task
-    "swing_up": it starts hanging. "balance": it starts upright, and the episode ends where h is below 0.8. Each
-    coordinate and rate is off by up to 0.05 in m, rad, m/s, rad/s: uniform numbers of the seed, the same to the bit.
+    "swing_up": it starts hanging. "balance": it starts upright, and the episode ends when h is below 0.8. Each
+    coordinate and rate differs by up to 0.05 in m, rad, m/s, rad/s: uniform numbers from the seed, reproducible to the
+    last bit.
 start
-    ``reset(options={"start": {"theta": [0.1, "5 deg"]}})`` starts exactly there, with what
-    :meth:`pendula.Chain.simulate` takes; what is left out is 0.
+    ``reset(options={"start": {"theta": [0.1, "5 deg"]}})`` starts exactly there, with the names of
+    :meth:`pendula.Chain.simulate`; others are 0.
 time
-    Environments that ``gymnasium.make`` and ``make_vec`` make are truncated after 500 steps.
+    ``gymnasium.make`` and ``make_vec`` make environments that are truncated after 500 steps.
 """
 
 from __future__ import annotations
@@ -63,7 +64,7 @@ FALLEN = 0.8  # of the height where it stands
 
 
 class Pendulum(gymnasium.Env[Any, Any]):
-    """What the environments have in common: :class:`CartPendulum`, :class:`Acrobot`. It is not made by itself."""
+    """The abstract base class of the environments :class:`CartPendulum` and :class:`Acrobot`."""
 
     metadata: dict[str, Any] = {"render_modes": []}  # noqa: RUF012  (as Gymnasium has it)
     observation_space: gymnasium.Space[NDArray[Any]]
@@ -90,7 +91,7 @@ class Pendulum(gymnasium.Env[Any, Any]):
         self._step, self._tolerance = positive("step", step), positive("tolerance", tolerance)
         self._system, self._task, self._links, self._motors = system, task, links, motors
         self._state: NDArray[np.float64] | None = None
-        self._members = self._made_members()  # what is wrong with the system is told now
+        self._members = self._made_members()  # raises errors of the system now
         each = np.broadcast_to(numbers("lengths", lengths), (links,))
         self._share = np.ascontiguousarray(each / each.sum())  # of each link in the height
         places = np.array([*limits, *[np.inf] * links])
@@ -112,7 +113,7 @@ class Pendulum(gymnasium.Env[Any, Any]):
 
     @abstractmethod
     def _inputs(self, actions: NDArray[np.float64]) -> NDArray[np.float64]:
-        """(…, motors) -> (…, inputs), in N or N m; linear, number by number, so that many give what one gives."""
+        """(…, motors) -> (…, inputs), in N or N m; linear, number by number, so that batches do not change bits."""
 
     @abstractmethod
     def _held(self, inputs: NDArray[np.float64]) -> dict[str, NDArray[np.float64]]:
@@ -120,19 +121,19 @@ class Pendulum(gymnasium.Env[Any, Any]):
 
     @property
     def state(self) -> NDArray[np.float64]:
-        """What moves, in 64 bits, as x, theta_1, ..., x_dot, theta_dot_1, ...; an acrobot has no x."""
+        """The state, in 64 bits: x, theta_1, ..., x_dot, theta_dot_1, ...; an acrobot has no x."""
         return self._now().copy()
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[NDArray[Any], dict[str, Any]]:
-        """Starts an episode: at random, or where ``options["start"]`` says. Raises InputError."""
+        """Starts an episode: at a random state, or at ``options["start"]``. Raises InputError."""
         super().reset(seed=seed)
         self._state = self._begun(self.np_random, options)
         return self._seen(self._state[None])[0], {"state": self.state}
 
     def step(self, action: ArrayLike) -> tuple[NDArray[Any], float, bool, bool, dict[str, Any]]:
-        """Holds an action for a step. Raises InputError; RunFailed where the mathematics fails."""
+        """Holds an action for a step. Raises InputError; RunFailed if the computation fails."""
         inputs = self._inputs(self._acted(action, (self._motors,)))
         states = self._moved(inputs[None], self._now()[None])
         self._state = states[0]
@@ -145,14 +146,14 @@ class Pendulum(gymnasium.Env[Any, Any]):
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """A and B of a step, x_next = A x + B a for deviations x of the state and a of the action, which is held.
 
-        They are exact for steps inside that one as a new :class:`pendula.Simulation` chooses them. Nothing moves.
+        They are exact for the steps that a new :class:`pendula.Simulation` takes inside that one. Nothing moves.
 
         Parameters
         ----------
         action : (motors,) array_like, optional
             0 if left out.
         state : (2n,) array_like, optional
-            As :attr:`state`, where it is if left out.
+            As :attr:`state`; by default the present one.
 
         Returns
         -------
@@ -180,7 +181,7 @@ class Pendulum(gymnasium.Env[Any, Any]):
         by_inputs = np.hstack([found.by_inputs[name][0] for name in self._held(inputs)])
         return found.by_start[0], by_inputs @ self._inputs(np.eye(self._motors)).T
 
-    # What follows is of many states at once, (members, 2n), and gives each what it would give it alone, to the bit.
+    # The following take many states at once, (members, 2n). The result for each is that of the state alone, bit by bit.
 
     def _seen(self, states: NDArray[np.float64]) -> NDArray[Any]:
         angles = np.ascontiguousarray(states[:, self._angles()])
@@ -216,7 +217,7 @@ class Pendulum(gymnasium.Env[Any, Any]):
         return slice(count - self._links, count)
 
     def _named(self, state: NDArray[np.float64]) -> dict[str, object]:
-        """Coordinates and rates by name, as simulations start."""
+        """Coordinates and rates by name, as the start of a simulation."""
         places, rates = np.split(state, 2)
         own = places.size - self._links
         named: dict[str, object] = {
@@ -258,7 +259,7 @@ class Pendulum(gymnasium.Env[Any, Any]):
         return self._state
 
     def _moved(self, inputs: NDArray[np.float64], states: NDArray[np.float64]) -> NDArray[np.float64]:
-        """States a step later, each with its row of inputs held."""
+        """The states one step later, each with its row of inputs held."""
         with plainly():
             return self._members.move(np.ascontiguousarray(inputs), np.ascontiguousarray(states))
 
@@ -270,20 +271,20 @@ class CartPendulum(Pendulum):
     ----------
     links : int
     force : float
-        The largest of the motor, in N.
+        The largest force of the motor, in N.
     track : float
-        How far the cart may go to either side, in m.
+        The largest distance of the cart from the middle, in m.
     task : {"swing_up", "balance"}
     step : float
-        How long an action is held, in s.
+        The time for which an action is held, in s.
     tolerance : float
-        Of the steps inside one, as for :class:`pendula.Simulation`.
+        The tolerance of the steps inside, as for :class:`pendula.Simulation`.
     speed_limit : float
-        How fast the cart and the links may be, in m/s and rad/s.
+        The largest speed of the cart, in m/s, and of the links, in rad/s.
     dtype : {float64, float32}
-        Of observations and actions.
+        The type of observations and actions.
     parameters
-        Those of the built-in model ``cart_chain``: ``masses``, ``lengths``, ``damping``, ``cart_mass``,
+        Parameters of the built-in model ``cart_chain``: ``masses``, ``lengths``, ``damping``, ``cart_mass``,
         ``cart_friction``, ``gravity``.
 
     Examples
@@ -340,7 +341,7 @@ class Acrobot(Pendulum):
     links : int
         At least 2.
     torque : float
-        The largest of each motor, in N m.
+        The largest torque of each motor, in N m.
     task, step, tolerance, speed_limit, dtype
         As for :class:`CartPendulum`.
     parameters
@@ -383,7 +384,7 @@ class Acrobot(Pendulum):
 
 
 class PendulumVectorEnv(VectorEnv[Any, Any, Any]):
-    """Many environments of one kind: each goes on to the bit as a single one with its seed.
+    """Many environments of one kind. Each moves as a single one with its seed, to the last bit.
 
     They move side by side in the lanes of one core.
 
@@ -391,7 +392,7 @@ class PendulumVectorEnv(VectorEnv[Any, Any, Any]):
     ----------
     num_envs : int
     max_episode_steps : int, optional
-        After how many steps an episode is truncated; never, if left out.
+        The number of steps after which an episode is truncated; by default never.
     autoreset_mode : gymnasium.vector.AutoresetMode or str
         "NextStep", "SameStep" or "Disabled", as Gymnasium has them; ``reset(options={"reset_mask": ...})`` resets some.
     options
@@ -434,9 +435,9 @@ class PendulumVectorEnv(VectorEnv[Any, Any, Any]):
     def reset(
         self, *, seed: int | Sequence[int | None] | None = None, options: dict[str, Any] | None = None
     ) -> tuple[NDArray[Any], dict[str, Any]]:
-        """Starts episodes: of all, or where ``options["reset_mask"]`` is true.
+        """Starts episodes: of all environments, or where ``options["reset_mask"]`` is true.
 
-        A single seed is that of the first environment, those after it have the next ones. Raises InputError.
+        A single seed is that of the first environment; the others have the following seeds. Raises InputError.
         """
         count = self.num_envs
         seeds = [None if seed is None else seed + k for k in range(count)] if _is_one(seed) else list(seed)  # type: ignore[arg-type, operator]
@@ -459,7 +460,7 @@ class PendulumVectorEnv(VectorEnv[Any, Any, Any]):
     def step(
         self, actions: ArrayLike
     ) -> tuple[NDArray[Any], NDArray[np.float64], NDArray[np.bool_], NDArray[np.bool_], dict[str, Any]]:
-        """Holds an action each, (num_envs, motors). Raises InputError; RunFailed where the mathematics fails."""
+        """Holds an action for each, (num_envs, motors). Raises InputError; RunFailed if the computation fails."""
         one = self._one
         inputs = one._inputs(one._acted(actions, (self.num_envs, one._motors)))
         if self._states is None:
@@ -497,7 +498,7 @@ class PendulumVectorEnv(VectorEnv[Any, Any, Any]):
     def _begin(
         self, k: int, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> NDArray[np.float64]:
-        """The state that an episode of one environment starts in: that of a single one with its seed."""
+        """The start of an episode of environment k: the same as of a single one with its seed."""
         random = self._randoms[k]
         if random is None or seed is not None:
             random = self._randoms[k] = np_random(seed)[0]
@@ -521,7 +522,7 @@ def _is_one(seed: object) -> bool:
 
 
 def _told(states: NDArray[np.float64], mask: NDArray[np.bool_]) -> dict[str, Any]:
-    """The infos of a vector environment: states, and of which environments."""
+    """The infos of a vector environment: states, and a mask of the environments that have one."""
     return {"state": np.where(mask[:, None], states, 0.0), "_state": mask.copy()}
 
 

@@ -44,8 +44,8 @@ def simulate(
 ) -> jax.Array:
     """The states of a motion at times, as a function that JAX differentiates and maps.
 
-    Derivatives are those of the discrete motion, whose step sizes are held: forward (``jax.jvp``) and backward
-    (``jax.grad``) by the same matrices, of first order. Motions of a mapped call run on all processors.
+    First derivatives are those of the discrete motion, with step sizes held fixed: forward (``jax.jvp``) and backward
+    (``jax.grad``) by the same matrices. Motions of a mapped call run on all processors.
 
     Parameters
     ----------
@@ -68,7 +68,7 @@ def simulate(
     InputError
         An argument is wrong, or JAX computes with 32 bits.
     jax.errors.JaxRuntimeError
-        What goes wrong while JAX runs the motion, as RunFailed and values of parameters: its text has the message.
+        An error while JAX runs the motion, such as RunFailed or wrong values of parameters; its text has the message.
     """
     if jnp.zeros(0).dtype != jnp.float64:
         raise InputError(
@@ -88,7 +88,7 @@ def simulate(
 
 
 def _of_each(function: Callable[[Any, Tree], Any], states: NDArray[np.float64], values: Tree) -> Any:
-    """What a function gives of each state of a mapped call, by as many threads as there are processors."""
+    """Calls a function for each state of a mapped call, on as many threads as there are processors."""
     batch = states.shape[:-1]
     if not batch:
         return function(states, values)

@@ -20,7 +20,7 @@ from ._runs import mapping
 from ._systems import System
 
 try:
-    torch: Any = importlib.import_module("torch")  # by a name that type checkers need not know: it is large
+    torch: Any = importlib.import_module("torch")  # this way type checkers do not read it: it is large
 except ImportError as _error:
     raise ImportError("pendula.torch: expected PyTorch, got none; pip install 'pendula[torch]'") from _error
 
@@ -37,7 +37,7 @@ def simulate(
 ) -> Any:
     """The states of a motion at times, as a function that PyTorch differentiates.
 
-    Derivatives are those of the discrete motion, whose step sizes are held: backward, of first order.
+    First derivatives are those of the discrete motion, with step sizes held fixed; backward only.
 
     Parameters
     ----------

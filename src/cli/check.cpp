@@ -43,7 +43,7 @@ Chain<Space> test_chain(int links) {
   return Chain<Space>(parameters);
 }
 
-/// Spread-out links, turning around the vertical away from the poles, where (θ, φ) serve well.
+/// Spread-out links that turn around the vertical, away from the poles of (θ, φ).
 template <class Space>
 State<Space> test_start(int links) {
   const Eigen::VectorXd number = Eigen::VectorXd::LinSpaced(links, 0, links - 1);
@@ -107,7 +107,7 @@ void check_space(const CheckOptions& options, Tally& tally) {
     const std::string_view name = kernel->info.name;
     const int links = kernel->info.links;
     if (options.links && *options.links != links) continue;
-    // Beside the limits stands the largest error of the committed kernels.
+    // Beside each limit: the largest error of the committed kernels.
     const std::vector<KernelPoint> points = random_points(kernel->info, seed);
     tally.add({name, std::string(width_line), width_error(*kernel, points), 1e-13});  // 5.5e-16
     if (kernel->of_1.series_next != nullptr) {
@@ -144,7 +144,7 @@ void check_system(const ModelToCheck& checked, const io::Toolchain& toolchain, T
   add(MotionCheck(info.name, *checked.system, checked.start, units, comparison.energy_rounding()), info.name, tally);
 }
 
-/// A system with default parameters; 1 for those without a default.
+/// Numbers of a system with default parameters; 1 for parameters without a default.
 SystemNumbers usual_numbers(const SystemInfo& info) {
   SystemNumbers numbers;
   for (std::size_t k = 0; k < info.parameters.size(); ++k) {

@@ -17,7 +17,7 @@
 namespace pendula::cli {
 namespace {
 
-/// A check of an option's text; `expected` is for the message if `accept` says no.
+/// A check of an option's text; `expected` is for the message if `accept` returns false.
 CLI::Validator expect(const std::string& expected, bool (*accept)(const std::string&)) {
   return {[=](const std::string& text) {
             return accept(text) ? "" : "expected " + expected + ", got " + (text.empty() ? "an empty text" : text);
@@ -102,7 +102,7 @@ bool is_finite(const std::string& text) {
   return std::isfinite(read_number<double>(text).value_or(std::nan("")));
 }
 
-/// 0 for anything else.
+/// The number in a text; 0 if the text is anything else.
 int whole_number(const std::string& text) {
   return read_number<int>(text).value_or(0);
 }

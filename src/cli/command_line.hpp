@@ -12,8 +12,8 @@
 
 namespace pendula::cli {
 
-/// What a word of the command line may be, for completion: a file with one of these endings (any, if there are none),
-/// one of these words, or a key of the scenario.
+/// The values that a word of the command line may have, for completion: a file with one of these endings (any, if there
+/// are none), one of these words, or a key of the scenario.
 // NOLINTBEGIN(readability-redundant-member-init): left out in designated initializers
 struct Expected {
   std::vector<std::string_view> endings = {};
@@ -96,7 +96,7 @@ std::string likely_meant(const CLI::App& app, const std::string& word);
 /// Throws io::InputError on `--set KEY VALUE`, which is one word, KEY=VALUE.
 void require_one_word(const std::vector<std::string>& words);
 
-/// `pendula completion --words WORD...` is how the scripts of shells ask.
+/// The scripts of shells ask by `pendula completion --words WORD...`.
 inline constexpr std::string_view candidates_flag = "--words";
 
 /// Candidates for the last of the words after `pendula`, a line each, some with a tab and a description; or `:files`

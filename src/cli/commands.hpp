@@ -12,12 +12,12 @@ namespace pendula::cli {
 /// Exit statuses of the program.
 enum ExitStatus {
   done = 0,
-  failed = 1,       ///< the computation failed; what was computed is kept
+  failed = 1,       ///< the computation failed; results up to there are kept
   wrong_input = 2,  ///< file, key, value, command or option
   unfinished = 3,   ///< members of an ensemble are missing; --resume goes on
 };
 
-/// What a film looks like: words of the package that draws it.
+/// The look of a film, in the words of the package that draws it.
 struct FilmOptions {
   double fps = 30;                                                ///< frames a second
   double speed = 1;                                               ///< of the motion, relative to real time
@@ -60,7 +60,7 @@ struct BuildOptions {
   std::optional<int> links;  ///< if the model has links
 };
 
-/// Makes the kernel of a model, unless it exists; prints where it is. Throws io::InputError.
+/// Makes the kernel of a model, unless it exists, and prints its file. Throws io::InputError.
 ExitStatus build(const BuildOptions& options);
 
 struct DescribeOptions {
@@ -94,9 +94,9 @@ ExitStatus plot(const PlotOptions& options);
 
 struct MapOptions {
   std::string file;     ///< of an ensemble
-  std::string key;      ///< what is kept of every member
+  std::string key;      ///< a quantity that is kept for every member
   std::string output;   ///< .svg, .png or .pdf
-  std::string scale;    ///< "log" or "linear"; if empty, chosen by the numbers
+  std::string scale;    ///< "log" or "linear"; if empty, the numbers decide
   std::string contour;  ///< `key=value`, a contour line; empty for none
 };
 
@@ -128,7 +128,7 @@ struct ExportOptions {
   std::optional<int> links;            ///< of a model that has links
   std::string language;                ///< "c", "casadi" or "fmu"
   std::string output;                  ///< the folder for files, or the file of an FMU
-  std::string name;                    ///< what names begin with; empty for that of the model
+  std::string name;                    ///< prefix of names; empty for the model's name
   std::optional<int> stages;           ///< of the Gauss step; else those of the scenario, or 2
   bool is_float = false;               ///< numbers are float
 };
@@ -140,7 +140,7 @@ struct LyapunovOptions {
   std::string scenario;                ///< the file
   std::vector<std::string> overrides;  ///< `key.path=value`
   int count = 0;                       ///< leading exponents; 0 for all
-  std::optional<std::string> output;   ///< CSV of how they converge
+  std::optional<std::string> output;   ///< CSV of their convergence
   bool json = false;
 };
 
@@ -155,7 +155,7 @@ struct LinearizeOptions {
   bool json = false;
 };
 
-/// Prints the linear system beside a scenario's start, or an equilibrium near it. Throws io::InputError.
+/// Prints the linearisation at a scenario's start, or at an equilibrium near it. Throws io::InputError.
 ExitStatus linearize(const LinearizeOptions& options);
 
 struct EnsembleOptions {
@@ -165,7 +165,7 @@ struct EnsembleOptions {
   std::string output;                  ///< HDF5 file
   int threads = 0;  ///< of each process; 0 for the number of cores, or one if there are several ranks
   std::optional<io::Shard> shard;
-  bool resume = false;  ///< goes on with the journals beside the output
+  bool resume = false;  ///< continues with the journals beside the output
   bool json = false;
   bool quiet = false;
 

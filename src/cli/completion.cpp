@@ -109,7 +109,7 @@ std::string one_line(std::string_view word, std::string_view what) {
   return std::string(word) + (what.empty() ? "" : '\t' + std::string(what)) + '\n';
 }
 
-/// The option that a word is, or begins with (--option=…).
+/// The option that a word names, with or without a value (--option=…).
 const CLI::Option* option_named(const CLI::App& app, std::string_view word) {
   for (const CLI::Option* option : options_of(app)) {
     for (const std::string& name : option->get_lnames()) {
@@ -151,7 +151,7 @@ std::string key_lines(std::string_view command, std::string_view begin, const st
   return text;
 }
 
-/// Candidates for the value of an option or argument that begins so.
+/// Candidates for the value of an option or argument, those that begin with `begin`.
 std::string value_lines(const CommandLine& line, const CLI::App& command, const CLI::Option* option,
                         std::string_view begin, const std::string& before = "") {
   const auto found = line.expected.find(option);
@@ -188,7 +188,7 @@ std::string command_lines(const CLI::App& app, std::string_view begin) {
   return text;
 }
 
-/// The argument after so many given ones.
+/// The argument after `given` ones.
 const CLI::Option* next_argument(const CLI::App& command, std::size_t given) {
   const std::vector<const CLI::Option*> arguments = arguments_of(command);
   if (given < arguments.size()) return arguments[given];

@@ -48,7 +48,7 @@ void add_number(Words& words, const std::string& key, double number) {
   throw io::InputError(scenario + ": export: " + what);
 }
 
-/// `space:links` as arguments of the generator; nothing if it is no chain.
+/// `space:links` as arguments of the generator; nullopt if the text names no chain.
 std::optional<Words> chain_words(const std::string& what, const std::optional<int>& links) {
   const std::size_t colon = what.find(':');
   const std::string space = what.substr(0, colon);
@@ -73,7 +73,7 @@ void add_start(Words& words, const Motion& start) {
   add_number(words, "time", start.time);
 }
 
-/// The laws of a controller, which has one time from one sample to the next.
+/// The laws of a controller, which must all have one sample time.
 Words sampled_words(const std::vector<io::FeedbackPlan>& feedback, const Subject& subject) {
   Words words;
   double sample = 0;
@@ -128,7 +128,7 @@ Words scenario_words(const io::SystemScenario& scenario, io::ModelName model, co
   return words;
 }
 
-/// Exports hold inputs themselves.
+/// Refuses signals: in exports the caller sets inputs.
 void refuse_signals(const io::RunPlan& plan) {
   if (plan.signals.empty()) return;
   refuse(
@@ -137,7 +137,7 @@ void refuse_signals(const io::RunPlan& plan) {
       "(of a chain chain.signal=) leaves it out");
 }
 
-/// The time from one sample to the next; else the constant step; nothing if there is neither.
+/// The sample time; else the constant step; nullopt if there is neither.
 std::optional<double> step_of(const io::RunPlan& plan) {
   for (const io::FeedbackPlan& feedback : plan.feedback) {
     if (feedback.sample > 0) return feedback.sample;
@@ -146,13 +146,13 @@ std::optional<double> step_of(const io::RunPlan& plan) {
                                                                        : std::nullopt;
 }
 
-/// What the steps of an FMU err by: the tolerance that is asked for, or the accuracy.
+/// The tolerance of the steps of an FMU: the accuracy that is asked for, or the tolerance.
 double tolerance_of(const io::RunPlan& plan) {
   if (!is_adaptive(plan.options)) return RunOptions{}.tolerance;
   return plan.accuracy.error > 0 ? plan.accuracy.error : plan.options.tolerance;
 }
 
-/// What the generator is told of the library that an FMU has in it.
+/// Arguments of the generator for the library in an FMU.
 Words library_words(const io::Toolchain& toolchain) {
   std::error_code unknown;
   if (!std::filesystem::is_regular_file(toolchain.library, unknown)) {
@@ -166,7 +166,7 @@ Words library_words(const io::Toolchain& toolchain) {
   return words;
 }
 
-/// What the generator is told of a scenario.
+/// Arguments of the generator for a scenario.
 Words scenario_words(const ExportOptions& options, io::Toolchain toolchain) {
   toolchain.kernels_by = "interpreter";  // nothing runs
   std::optional<io::ModelName> model;
@@ -203,7 +203,7 @@ Words scenario_words(const ExportOptions& options, io::Toolchain toolchain) {
       scenario);
 }
 
-/// What names begin with where nothing says so.
+/// The default prefix of names.
 std::string default_name(const ExportOptions& options) {
   if (options.what.ends_with(".toml")) return std::filesystem::path(options.what).stem().string();
   const std::string stem = std::filesystem::path(options.what).stem().string();

@@ -57,7 +57,7 @@ constexpr std::array<Example, 28> examples = {{
 
 constexpr std::size_t width = 80;
 
-/// Wraps text into lines that begin at a column; the first one continues a line.
+/// Wraps text into lines that begin at a column; the first one continues `line`.
 std::string wrapped(std::string line, std::size_t column, std::string_view text) {
   std::string all;
   if (!line.empty() && line.size() >= column) {

@@ -25,7 +25,7 @@ std::vector<Example> examples_of(std::string_view command);
 /// The version and the instruction set.
 std::string version_text();
 
-/// How an option or argument is typed: `-o, --output FILE`.
+/// An option or argument as it is typed: `-o, --output FILE`.
 std::string typed(const CLI::Option& option);
 
 /// Options of a command, or its arguments.
@@ -35,13 +35,13 @@ std::vector<const CLI::Option*> arguments_of(const CLI::App& command);
 /// `pendula simulate [OPTIONS] SCENARIO`.
 std::string usage(const CLI::App& command);
 
-/// How a table is written: `[chain]`, `[[event]]`.
+/// The heading of a table: `[chain]`, `[[event]]`.
 std::string heading(const io::ScenarioTable& table);
 
 /// Tables of a scenario that a command reads.
 std::vector<const io::ScenarioTable*> tables_of(std::string_view command);
 
-/// What a key takes, its unit and its default: `number > 0; s; must be given`.
+/// The values of a key, its unit and its default: `number > 0; s; must be given`.
 std::string terms(const io::ScenarioKey& key);
 
 inline constexpr std::string_view exit_status =

@@ -5,12 +5,12 @@
 
 namespace pendula::cli {
 
-/// Restores the effect of SIGHUP that it had when the program began. Libraries may have changed it before main: UCX,
-/// which comes with Open MPI 5, takes SIGHUP even if nohup had it ignored.
+/// Restores the effect that SIGHUP had when the program began. Libraries may have changed it before main: UCX, which
+/// comes with Open MPI 5, handles SIGHUP even under nohup.
 void restore_hang_up();
 
-/// While it lives, the first SIGINT (Ctrl-C), SIGHUP or SIGTERM is noted, so that a run can stop at its next step and
-/// keep its results. The second one ends the program at once.
+/// As long as this lives, it notes the first SIGINT (Ctrl-C), SIGHUP or SIGTERM, so that a run can stop at its next
+/// step and keep its results. The second one ends the program at once.
 class InterruptGuard {
  public:
   InterruptGuard();

@@ -46,14 +46,14 @@ std::string link_of(const io::Scenario<Space>& scenario) {
 
 void no_words(const std::string&) {}
 
-/// What a page is told of a model.
+/// The start of a page for a model.
 json model_start(const io::ModelName& name, const SystemInfo& info, const io::Toolchain& toolchain) {
   json start = view::lab_model(info, io::kernel_program(name, toolchain, no_words));
   start["title"] = info.model;
   return start;
 }
 
-/// The same of a model and its start in a scenario.
+/// The same for a model and its start in a scenario.
 json start_of(const io::SystemScenario& scenario, const io::ModelName& name, const io::Toolchain& toolchain) {
   warn(scenario);
   json start = model_start(name, scenario.system->info(), toolchain);

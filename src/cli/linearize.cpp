@@ -30,15 +30,15 @@
 namespace pendula::cli {
 namespace {
 
-/// A linear system beside a motion, and what its numbers are.
+/// The linearisation at a motion, with names of its numbers.
 struct Linear {
   Motion at;
   std::vector<std::string> names, inputs, outputs;
   Directions<> a, b, c, d;
-  std::optional<double> step;  ///< from one time to the next; nothing: continuous
+  std::optional<double> step;  ///< of the discrete system  [s]; nullopt: continuous
 };
 
-/// How an eigenvalue swings, as exp((-damping w + i …) t) does: w in Hz, undamped, and the damping ratio.
+/// The oscillation of an eigenvalue, exp((-damping w + i …) t): undamped frequency w  [Hz], and damping ratio.
 struct Swing {
   double frequency, damping;
 };
@@ -56,7 +56,7 @@ std::vector<std::string> state_names(const Subject& subject) {
   return names;
 }
 
-/// From one time to the next, while inputs are held.
+/// Makes the system discrete: from one time to the next, while inputs are held.
 void make_discrete(const Subject& subject, const RunOptions& options, double step, const InterruptGuard& guard,
                    Linear& linear) {
   const Eigen::Index n = linear.a.rows(), inputs = linear.b.cols();
@@ -64,7 +64,7 @@ void make_discrete(const Subject& subject, const RunOptions& options, double ste
   for (const Varied& one : varied_by(subject)) varied += one.size;
   Directions<> of_start = Directions<>::Zero(n, n + inputs), of_parameters = Directions<>::Zero(varied, n + inputs);
   of_start.leftCols(n).setIdentity();
-  of_parameters.bottomRightCorner(inputs, inputs).setIdentity();  // inputs are the last
+  of_parameters.bottomRightCorner(inputs, inputs).setIdentity();  // inputs come last
   const std::array<double, 1> times = {linear.at.time + step};
   const Forward moved = move_variations({.subject = subject,
                                          .options = options,
@@ -170,7 +170,7 @@ void print_text(const Linear& linear, const Eigen::VectorXcd& eigenvalues) {
     print_matrix(linear.c, linear.outputs, linear.names);
   }
   std::cout << "\neigenvalues of A                      frequency  damping ratio\n";
-  const double smallest = 1e-13 * eigenvalues.cwiseAbs().maxCoeff();  // less is rounding
+  const double smallest = 1e-13 * eigenvalues.cwiseAbs().maxCoeff();  // smaller ones are rounding
   for (const std::complex<double>& one : eigenvalues) {
     std::cout << std::setw(15) << (std::abs(one.real()) < smallest ? "0" : rounded(one.real(), 6));
     if (std::abs(one.imag()) >= smallest) {
@@ -190,7 +190,7 @@ ExitStatus linearize(const LinearizeOptions& options) {
   const InterruptGuard guard;
   const Linear linear = std::visit(
       [&](auto scenario) {
-        scenario.signals.clear();  // they add to u, which stands in the result
+        scenario.signals.clear();  // they add to u, which is an input of the result
         return io::told_at_keys(scenario, options.scenario, [&] { return linear_of(scenario, options, guard); });
       },
       read_scenario(options.scenario, options.overrides, options.json));

@@ -20,7 +20,7 @@
 namespace pendula::cli {
 namespace {
 
-/// The exponents as they converge: t, then one a column.
+/// A CSV file of the exponents as they converge: t, then a column for each.
 class HistoryFile {
  public:
   HistoryFile(const std::string& name, int count) : file_(name) {

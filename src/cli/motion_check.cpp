@@ -27,9 +27,9 @@ std::string label(const std::string& what, int stages, Form form) {
 
 }  // namespace
 
-// Doubles the time from a picosecond up to thirty thousand years until eight steps no longer follow the motion; longer
-// times might step over what acts for a moment only. The first times may be too short: where forces nearly balance at
-// the start, what moves is rounding. Checks run over half that time, or less if that is not short enough.
+// Doubles the time, from a picosecond up to thirty thousand years, until eight steps no longer follow the motion;
+// longer times might step over forces that act for a moment only. The first times may be too short: where forces nearly
+// balance at the start, only rounding moves. Checks run over half that time, or less if that is not short enough.
 MotionCheck::MotionCheck(std::string_view kernel, const Subject& subject, Motion start, std::vector<std::string> units,
                          double energy_rounding)
     : kernel_(kernel),
@@ -112,7 +112,7 @@ double MotionCheck::distance(const std::optional<Motion>& a, const std::optional
                   ((a->v - b->v).array() / span.v.array()).abs().maxCoeff());
 }
 
-/// The distance, in units of what a rounding in each of 32 steps grows to.
+/// The distance in roundings: 1 is the distance to which a rounding in each of 32 steps grows.
 double MotionCheck::roundings(const std::optional<Motion>& a, const std::optional<Motion>& b, const Span& span) {
   return distance(a, b, span) / (32 * epsilon * span.growth);
 }
@@ -136,7 +136,7 @@ std::optional<Motion> MotionCheck::end(const RunOptions& options, int steps, con
   return end ? std::optional(end->motion) : std::nullopt;
 }
 
-/// The end by adaptive steps, which notice what acts for less than a step.
+/// The end by adaptive steps, which notice forces that act for less than a step.
 std::optional<Motion> MotionCheck::own_steps(double time) const {
   RunSetup setup{{options(8, Form::momentum), time, std::numeric_limits<std::int64_t>::max()},
                  {std::shared_ptr<void>(), &subject_},
@@ -148,7 +148,7 @@ std::optional<Motion> MotionCheck::own_steps(double time) const {
   return report.end == RunEnd::complete ? std::optional(report.last) : std::nullopt;
 }
 
-/// A span with nothing but its sizes.
+/// A span with its sizes only.
 std::optional<MotionCheck::Span> MotionCheck::sized(double time) const {
   constexpr int steps = 16;
   const auto integrator = subject_.make_integrator(options(8, Form::momentum));
@@ -203,7 +203,7 @@ std::optional<MotionCheck::Span> MotionCheck::span(double time) const {
   return span;
 }
 
-/// By how much a small change of a state grows.
+/// The factor by which a small change of a state grows.
 double MotionCheck::growth(const Motion& from, double time, const Span& span) const {
   constexpr double change = 1e-9;
   Motion near = from;
@@ -308,7 +308,7 @@ CheckLine MotionCheck::dense_output(const Span& span) const {
   return at_least("order of glances into a step, 6 stages", nearer < span.noise ? none : std::log2(off / nearer), 5);
 }
 
-/// An event: the fastest coordinate passes the value that it has after a while.
+/// Checks an event: the fastest coordinate passes the value that it has after a while.
 CheckLine MotionCheck::event(const Span& span) const {
   const double duration = span.time / 4, when = 0.37 * duration;
   const std::string what = "where an event happens, 6 stages";
@@ -327,8 +327,8 @@ CheckLine MotionCheck::event(const Span& span) const {
   return at_most(what, moved / (32 * epsilon * span.growth));
 }
 
-/// How far the derivative of a step, in coordinates and momenta, is from symplectic, relative to its size, in units in
-/// which a momentum moves its coordinate by as much as itself.
+/// The error of symplecticity of the derivative of a step, in coordinates and momenta, relative to its size. Momenta
+/// are scaled so that each moves its coordinate by as much as itself.
 CheckLine MotionCheck::tangents(const Span& span) const {
   const std::string what = "tangents: D'JD = J, 4 stages";
   const auto integrator = subject_.make_integrator(options(4, Form::momentum));

@@ -23,15 +23,15 @@ struct CheckLine {
   bool ok() const { return at_least ? measured >= limit : measured <= limit; }  // false if NaN
 };
 
-/// Checks the integrators of a subject on its own motion, over times that follow from the motion, in units of what one
-/// rounding a step grows to.
+/// Checks the integrators of a subject on its own motion, over times that follow from the motion. Errors are in units
+/// of the error to which one rounding a step grows.
 class MotionCheck {
  public:
   /// `units` are those of the coordinates; `energy_rounding` is the error of energies, 0 if unknown [J].
   MotionCheck(std::string_view kernel, const Subject& subject, Motion start, std::vector<std::string> units,
               double energy_rounding);
 
-  /// How long eight steps of eight stages follow the motion; 0 if they never do [s].
+  /// The longest time over which eight steps of eight stages follow the motion; 0 if there is none [s].
   double time() const { return time_; }
 
   std::vector<CheckLine> lines() const;
@@ -40,10 +40,10 @@ class MotionCheck {
   CheckLine dense_to_chain(Iteration iteration) const;
 
  private:
-  /// Where a run ended.
+  /// The end of a run.
   struct End {
     Motion motion;
-    double work = 0;  // that loads brought  [J]
+    double work = 0;  // work of loads  [J]
   };
 
   /// The beginning of the motion, up to a time.

@@ -26,7 +26,7 @@ ExitStatus draw(const std::vector<std::string>& arguments) {
   return status == 0 ? done : status == 2 ? wrong_input : failed;
 }
 
-/// The same, and tells what was written.
+/// The same, and prints the name of the picture.
 ExitStatus draw_picture(const std::vector<std::string>& arguments, const std::string& output) {
   const ExitStatus status = draw(arguments);
   if (status == done) std::cout << "picture            " << output << '\n';

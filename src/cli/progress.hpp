@@ -22,7 +22,7 @@ inline std::string rest_text(double seconds) {
   return std::to_string(whole / 3600) + " h " + std::to_string(whole % 3600 / 60) + " min";
 }
 
-/// A line on standard error that is redrawn, and removed in the end; nothing if that is no terminal.
+/// A line on standard error that is redrawn, and removed at the end. Does nothing if standard error is no terminal.
 class TerminalLine {
   using Clock = std::chrono::steady_clock;
 
@@ -61,8 +61,7 @@ class TerminalLine {
   Clock::time_point began_ = Clock::now(), drawn_at_ = began_;
 };
 
-/// A progress line on standard error: share done, rate, remaining time, energy error. Nothing is printed if that is no
-/// terminal.
+/// A progress line on standard error: share done, rate, remaining time, energy error; nothing if that is no terminal.
 class Progress : public Observer {
  public:
   Progress(const RunSetup& setup, bool wanted)
@@ -114,7 +113,7 @@ class Progress : public Observer {
   bool conserves_;
   TerminalLine line_;
   std::int64_t rows_ = 0;
-  double first_share_ = 0;                 // of a resumed run: the share that was done before
+  double first_share_ = 0;                 // share of a resumed run that was done before
   double first_energy_ = 0, largest_ = 0;  // J
 };
 

@@ -87,7 +87,7 @@ struct Ranks::Shared {};
 
 namespace {
 
-/// The first of some environment variables that is a number of at least so much; empty if there is none.
+/// The first of some environment variables that is a number of at least `least`; empty if there is none.
 std::string variable_of_at_least(int least, std::initializer_list<const char*> names) {
   for (const char* const name : names) {
     const char* const value = std::getenv(name);

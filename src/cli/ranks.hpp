@@ -6,11 +6,11 @@
 
 namespace pendula::cli {
 
-/// The processes of a job: those of mpirun, if this build has MPI, else this one alone.
+/// The processes of a job: those of mpirun, if this build has MPI, else this one only.
 class Ranks {
  public:
-  /// Throws io::InputError if a launcher has started several processes, and this build has no MPI: each would run the
-  /// whole job. Processes with shards of their own may do so.
+  /// Throws io::InputError if a launcher has started several processes, this build has no MPI, and there are no shards:
+  /// each process would run the whole job.
   explicit Ranks(bool has_shard);
   ~Ranks();
   Ranks(const Ranks&) = delete;

@@ -10,8 +10,8 @@
 
 namespace pendula::cli {
 
-/// The scenario in a file, with some keys replaced, `key.path=value`. That a kernel is made is told, unless it is to be
-/// quiet. Throws io::InputError.
+/// The scenario in a file, with some keys replaced, `key.path=value`. Unless `quiet`, says when a kernel is made.
+/// Throws io::InputError.
 inline io::AnyScenario read_scenario(const std::string& file, const std::vector<std::string>& overrides, bool quiet) {
   const io::FindSystem find = [&](const io::ModelName& name) {
     const auto tell = [&](const std::string& what) {

@@ -48,10 +48,10 @@ RowTimes film_times(const FilmOptions& film) {
   return {film.speed / film.fps / 4, {}};
 }
 
-/// Gives a page's laboratory the model that moves there. Where its program cannot be made, there is no laboratory.
+/// Adds the model to a page's laboratory. If its program cannot be made, the page has no laboratory.
 void add_model(view::Scene& scene, const io::ModelName& name, const SystemInfo& info) {
   try {
-    const auto no_words = [](const std::string&) {};  // the kernel that the run goes by was told of
+    const auto no_words = [](const std::string&) {};  // the making of the run's kernel was reported already
     const std::string program = io::kernel_program(name, io::Toolchain::of_this_program(), no_words);
     scene.laboratory_model = view::lab_model(info, program).dump();
   } catch (const io::ModelError&) {

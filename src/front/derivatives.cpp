@@ -31,7 +31,7 @@ std::shared_ptr<const Subject> holding(const pendula_model& model, const double*
   return inputs == nullptr ? model.subject : with_inputs(model.subject, {inputs, model.inputs.size()});
 }
 
-/// What moves along a path, and how: what a MotionTask refers to.
+/// The subject, options and start of a path, which a MotionTask refers to.
 struct Journey {
   explicit Journey(const pendula_path& path)
       : subject(holding(*path.model, path.inputs)),
@@ -47,7 +47,7 @@ struct Journey {
   std::shared_ptr<const Subject> subject;
   RunOptions options;
   Motion start;
-  Eigen::Index state, varied, times;  // numbers of a state; parameters and inputs; rows
+  Eigen::Index state, varied, times;  // sizes: of a state; of parameters and inputs; number of rows
 };
 
 /// Moves by `act`, a function of a MotionTask. Throws RunFailure.

@@ -9,7 +9,7 @@
 
 namespace pendula::front {
 
-/// The mathematics failed; the message says how.
+/// A run failed numerically; the message says how.
 class RunFailure : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
@@ -18,13 +18,13 @@ class RunFailure : public std::runtime_error {
 /// Throws RunFailure unless the outcome is ok.
 void require(const Outcome& outcome, const Subject& subject);
 
-/// Keeps what pendula_error() says to this thread; gives `status`.
+/// Keeps the message that pendula_error() returns in this thread. Returns `status`.
 pendula_status fail(pendula_status status, const char* what) noexcept;
 
-/// The same of the exception that is being handled.
+/// The same for the exception that is being handled.
 pendula_status fail() noexcept;
 
-/// Does it; what that throws becomes a status.
+/// Calls act(); an exception becomes a status.
 template <class Do>
 pendula_status guarded(Do&& act) noexcept {
   try {
@@ -34,7 +34,7 @@ pendula_status guarded(Do&& act) noexcept {
   }
 }
 
-/// Does it; what that throws makes it null.
+/// Calls make() and returns its result; null after an exception.
 template <class Do>
 auto made(Do&& make) noexcept -> decltype(make()) {
   try {

@@ -25,7 +25,7 @@
 namespace pendula::front {
 namespace {
 
-/// In the order in which motions are differentiated by them (run/derivatives.hpp).
+/// Parameters in the order of derivatives with respect to them (run/derivatives.hpp).
 std::vector<Constant> parameters_of(const Subject& subject) {
   std::vector<Constant> constants = subject.constants();
   if (dynamic_cast<const SystemSubject*>(&subject) != nullptr) return constants;
@@ -94,7 +94,7 @@ std::shared_ptr<const SystemTable> borrowed(const SystemTable& table) {
   return {std::shared_ptr<void>(), &table};
 }
 
-/// The numbers that a model has itself. Throws std::invalid_argument where one has none.
+/// The default parameters of a model. Throws std::invalid_argument if one has no default.
 std::vector<double> defaults_of(const SystemInfo& info) {
   std::vector<double> numbers;
   for (std::size_t k = 0; k < info.own_parameters(); ++k) {

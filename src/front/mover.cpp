@@ -15,7 +15,7 @@
 namespace pendula::front {
 namespace {
 
-/// Raises a flag for as long as it lives.
+/// Sets a flag for a scope.
 class Raised {
  public:
   explicit Raised(bool& flag) : flag_(flag) { flag_ = true; }
@@ -120,7 +120,7 @@ Advance Mover::advance_to(double time) {
       *integrator_, origin_, schedule, {}, [](const Motion&) {}, stop_, [](const RowPlace&, bool) {},
       [this] { return after_step(); });
   motion_ = integrator_->state();
-  if (result.outcome && !result.stopped && !result.end) {  // the time since the origin is exact to an ulp or two only
+  if (result.outcome && !result.stopped && !result.end) {  // the time from origin_ may be off by an ulp or two
     motion_.time = time;
     if (remembers_) history_.end_at(time);
   }
@@ -157,7 +157,7 @@ std::optional<Motion> Mover::after_step() {
   ++steps_;
   std::optional<Motion> end;
   if (!watch_.events().empty()) {
-    const ScopedStopSign none(*integrator_, {});  // what is found has to be right
+    const ScopedStopSign none(*integrator_, {});  // an interrupted search would find wrong events
     for (const Occurrence& happened : watch_.after_step(*integrator_)) {
       const std::size_t k = happened.event;
       const bool stops = happened_[k] && happened_[k](happened.up, happened.motion);
@@ -172,7 +172,7 @@ std::optional<Motion> Mover::after_step() {
   return end;
 }
 
-// The rest of the step is not taken.
+// Restarts at an event; the rest of the step is dropped.
 void Mover::restart_after(const Occurrence& happened) {
   motion_ = happened.motion;
   integrator_->start(motion_);

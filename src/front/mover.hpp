@@ -24,7 +24,7 @@
 
 namespace pendula::front {
 
-/// Where steps began, and the last one ended.
+/// The states where steps began, and where the last one ended.
 class StepHistory {
  public:
   void add(const Motion& motion) {
@@ -33,10 +33,10 @@ class StepHistory {
     numbers_.insert(numbers_.end(), motion.v.begin(), motion.v.end());
   }
 
-  /// The last one ended at this time, up to rounding.
+  /// Sets the time at which the last step ended, which may be rounded differently.
   void end_at(double time) { times_.back() = time; }
 
-  /// Of the last one nothing is known any more: the run went on from elsewhere, later.
+  /// Forgets all steps: the run went on from another state.
   void clear() {
     times_.clear();
     numbers_.clear();
@@ -44,7 +44,7 @@ class StepHistory {
 
   bool covers(double time) const { return !times_.empty() && time >= times_.front() && time <= times_.back(); }
 
-  /// The last one that is not after a time, which it covers.
+  /// The last state that is not after a time; the history must cover that time.
   Motion before(double time) const {
     const auto after = std::ranges::upper_bound(times_, time);
     const std::size_t place = static_cast<std::size_t>(std::distance(times_.begin(), after)) - 1;
@@ -65,14 +65,14 @@ struct Advance {
   std::optional<std::size_t> event = {};  // NOLINT(readability-redundant-member-init): left out in initializers
 };
 
-/// Moves a subject through time, on and on: what is behind a pendula_simulation. A copy goes on as the first does, to
-/// the bit, without its rows.
+/// Moves a subject through time: the implementation of a pendula_simulation. A copy goes on as the original does, to
+/// the last bit, without its rows.
 class Mover {
  public:
-  /// Told that an event has happened; true stops the run there.
+  /// Called when an event has happened; true stops the run there.
   using Happened = std::function<bool(bool up, const Motion& motion)>;
 
-  /// Throws std::invalid_argument as make_integrator does, NoKernel.
+  /// Throws std::invalid_argument and NoKernel as make_integrator does.
   Mover(std::shared_ptr<const Subject> subject, const RunOptions& options, bool remembers);
   Mover(const Mover& other);
   Mover& operator=(const Mover&) = delete;
@@ -81,48 +81,48 @@ class Mover {
   /// Begins, or goes on, from a motion.
   Outcome start(const Motion& motion);
 
-  /// What moves, with the inputs that are held.
+  /// The subject with the inputs that are held.
   const Subject& subject() const { return *subject_; }
   const Motion& motion() const { return motion_; }
   std::size_t steps() const { return steps_; }
   std::optional<std::size_t> stopped_by() const { return stopped_by_; }
 
   const std::vector<double>& inputs() const { return held_.back().inputs; }
-  /// Holds these as the constant parts of inputs from now on. Throws std::invalid_argument as with_inputs.
+  /// Holds these as the constant parts of inputs from now on. Throws std::invalid_argument as with_inputs does.
   Outcome hold(std::span<const double> inputs);
 
-  /// To `time`, where a step ends. Throws std::invalid_argument where that is past, and what callbacks throw.
+  /// Advances to `time`, where a step ends. Throws std::invalid_argument if that is past, and what callbacks throw.
   Advance advance_to(double time);
 
-  /// One step of its own size, wherever that ends. Throws what callbacks do.
+  /// Takes one step of the method's own size. Throws what callbacks throw.
   Advance step();
 
-  /// The motion at a time since the start, at the full order of the method, by a step from where the step that it lies
-  /// in began; a last one that step() took is looked into. Throws std::invalid_argument where there is none.
+  /// The motion at a time since the start, at the full order of the method: by a step from the start of the step that
+  /// contains the time, or within the last step if step() took it. Throws std::invalid_argument if no step contains it.
   Outcome at(double time, Motion& motion);
 
-  /// Asked after every step, and within long ones.
+  /// `stop` is asked after every step, and within long ones.
   void set_stop(std::function<bool()> stop) { stop_ = std::move(stop); }
   void on(Event event, Happened happened);
-  /// Other callbacks, as many as there are events.
+  /// Replaces the callbacks; their number must not change.
   void replace(std::vector<Event> events, std::vector<Happened> happened);
-  /// Rows from now on.
+  /// Gives rows to an observer from now on.
   void add(std::unique_ptr<Observer> observer, const RowTimes& times);
-  /// No more rows; throws what the last of them do.
+  /// Ends the rows; throws what observers throw.
   void finish();
 
-  /// All that the next steps depend on.
+  /// A copy of all that the next steps depend on.
   Member save();
   void resume(const Member& saved);
 
-  /// What is kept besides the integrator's.
+  /// Visits the numbers of the state besides those of the integrator.
   template <class Numbers>
   void member(Numbers& numbers) {
     numbers(held_.back().inputs, motion_.time, motion_.q, motion_.v, origin_, watch_);
   }
 
  private:
-  /// Inputs, and since when they are held.
+  /// Inputs, and the time since which they are held.
   struct Held {
     double since;
     std::vector<double> inputs;
@@ -137,15 +137,15 @@ class Mover {
 
   static constexpr double never = std::numeric_limits<double>::infinity();
 
-  std::shared_ptr<const Subject> model_, subject_;  // as it was given; with the inputs that are held
+  std::shared_ptr<const Subject> model_, subject_;  // as given; with the inputs that are held
   RunOptions options_;
   std::unique_ptr<Integrator> integrator_;
-  std::vector<Held> held_;             // of earlier ones those that steps are kept of
-  std::unique_ptr<Integrator> again_;  // takes steps again, to look into them
-  double again_since_ = 0;             // what inputs it has
+  std::vector<Held> held_;             // the present inputs last, before them those of steps in the history
+  std::unique_ptr<Integrator> again_;  // takes steps again, for states within them
+  double again_since_ = 0;             // Held::since of its inputs
   Motion motion_;
-  double origin_ = 0;          // where times are counted from
-  double seen_since_ = never;  // where the last step began, if the integrator can look into it
+  double origin_ = 0;          // time from which times are counted
+  double seen_since_ = never;  // start of the last step, if the integrator can find states within it
   std::size_t steps_ = 0;
   bool is_advancing_ = false;
   bool remembers_;

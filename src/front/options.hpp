@@ -6,7 +6,7 @@
 
 namespace pendula::front {
 
-/// What is asked for, by names. Throws std::invalid_argument, with those that there are, for a name that is none.
+/// The options that are given by names. Throws std::invalid_argument, with the known names, for an unknown one.
 RunOptions options_of(const pendula_options* given);
 
 }  // namespace pendula::front

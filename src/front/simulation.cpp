@@ -23,8 +23,8 @@ struct pendula_simulation {
 
   pendula_model model;
   pendula::front::Mover mover;
-  std::vector<pendula_event> events;  // as they were asked for
-  bool asked_to_stop = false;         // by a row
+  std::vector<pendula_event> events;  // as given
+  bool asked_to_stop = false;         // by a callback for rows
 };
 
 namespace pendula::front {
@@ -53,7 +53,7 @@ RowTimes rows_every(double interval) {
   return times;
 }
 
-/// Hands rows on.
+/// Passes rows to a callback.
 class Rows : public Observer {
  public:
   using Take = int (*)(void* context, const double* numbers, size_t count);
@@ -218,7 +218,7 @@ int pendula_stopped_by(const pendula_simulation* simulation) {
 
 pendula_status pendula_write_csv(pendula_simulation* simulation, const char* file, double interval) {
   return guarded([&] {
-    const RowTimes times = rows_every(interval);  // before the file is there, or is no longer what it was
+    const RowTimes times = rows_every(interval);  // may throw, so before the file is opened
     simulation->mover.add(std::make_unique<io::TrajectoryFile>(file, simulation->model.names), times);
     return PENDULA_OK;
   });

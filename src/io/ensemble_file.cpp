@@ -211,8 +211,8 @@ Found look_through(const std::string& folder, const EnsembleHead& head) {
   return found;
 }
 
-/// Makes empty data sets in the shape of the members, and scales. Returns the position of each but those of axes, which
-/// are full.
+/// Makes scales of the axes, with their values, and empty data sets in the shape of the members. Returns the position
+/// of each, 0 for axes.
 std::vector<Stored> create_arrays(const hdf5::Handle& file, const EnsembleHead& head,
                                   const std::vector<EnsembleArray>& arrays) {
   const std::vector<std::int64_t> shape = head.plan.shape();
@@ -249,7 +249,7 @@ void write_failures(const hdf5::Handle& file, const std::vector<DoneChunk::Messa
   hdf5::attach_scale(hdf5::create_texts(file, "message", texts), scale, 0);
 }
 
-/// Writes the numbers of members, and the values that they have each for themselves.
+/// Writes the numbers of members, and the values of keys that each member has for itself.
 void write_draws(const Bytes& bytes, const EnsembleHead& head, const std::vector<EnsembleArray>& arrays,
                  const std::vector<Stored>& places) {
   if (head.plan.draws.empty()) return;

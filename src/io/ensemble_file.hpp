@@ -38,22 +38,22 @@ constexpr bool is_ok(int status) {
 /// Result of a second look at a member, as numbered in the data set `trusted`; −1 if there was no second look.
 enum class Trusted { no, yes };
 
-/// A quantity that is kept of every member.
+/// A quantity that is kept for every member.
 struct EnsembleColumn {
-  std::string name;    ///< as it is asked for, `event:flip`: a data set is called so in letters, digits and underscores
+  std::string name;    ///< as asked for, `event:flip`; its data set is named in letters, digits and underscores
   std::string unit;    ///< in SI
   bool whole = false;  ///< a count: an integer in the file, −1 where there is none
   /// Long name, if the name alone does not say it.
   std::string meaning = {};  // NOLINT(readability-redundant-member-init): left out in initializers
 };
 
-/// What an ensemble's file says besides the results of its members.
+/// The contents of an ensemble's file besides the results of its members.
 struct EnsembleHead {
   RunOrigin origin;
   EnsemblePlan plan;
   std::vector<EnsembleColumn> columns;
   std::int64_t chunk = 1;               ///< members in one record of a journal
-  std::optional<NaturalUnits> natural;  ///< that the scenario's numbers are in; none for SI
+  std::optional<NaturalUnits> natural;  ///< units of the scenario's numbers; nullopt for SI
 
   std::int64_t chunks() const { return (plan.count + chunk - 1) / chunk; }
   Chunk members_of(std::int64_t k) const;
@@ -75,7 +75,7 @@ struct EnsembleTally {
   std::array<std::int64_t, member_statuses.size()> statuses{};
   std::int64_t looked_at = 0, untrusted = 0;  ///< among those that ran to their end
   std::int64_t first_untrusted = -1;          ///< number of a member
-  DoneChunk::Message first_failure{-1, {}};   ///< of the first member that has one
+  DoneChunk::Message first_failure{-1, {}};   ///< message of the first member that has one
 
   /// Adds the rows of members, of `width` numbers each.
   void add(const DoneChunk& chunk, std::size_t width);
@@ -94,7 +94,7 @@ struct EnsembleArray {
     axis,    ///< values of an axis; a scale
     number,  ///< numbers of the members; a scale where there are no axes
     row,     ///< a column of the rows of journals
-    draw     ///< values of a key that members have each for itself
+    draw     ///< values of a key that each member has for itself
   };
 
   std::string name;     ///< letters, digits and underscores
@@ -108,16 +108,16 @@ struct EnsembleArray {
   bool is_scale() const { return source == Source::axis || source == Source::number; }
 };
 
-/// A number of a row as its data set has it: what is not there is -1 among integers.
+/// A number of a row as its data set has it: among integers, -1 stands for a missing one.
 template <class Number>
 Number stored(double value) {
   return std::is_floating_point_v<Number> || !std::isnan(value) ? static_cast<Number>(value) : Number(-1);
 }
 
-/// Scales first, in the order of the axes.
+/// The data sets of an ensemble's file, scales first, in the order of the axes.
 std::vector<EnsembleArray> arrays_of(const EnsembleHead& head);
 
-/// Attributes of the whole: where it comes from, and of how many members there are numbers.
+/// Attributes of the file: its origin, and how many members are done.
 using EnsembleAttribute = std::pair<std::string, std::variant<std::string, std::int64_t>>;
 std::vector<EnsembleAttribute> attributes_of(const EnsembleHead& head, std::int64_t done);
 

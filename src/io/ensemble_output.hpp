@@ -19,7 +19,7 @@ struct Shard {
 struct EnsembleTarget {
   std::string file;  ///< HDF5
   std::optional<Shard> shard;
-  bool resumes = false;  ///< goes on with the journals beside the file
+  bool resumes = false;  ///< continues with the journals beside the file
 };
 
 /// The file of an ensemble, and the journals beside it, which other processes may write, too.
@@ -34,17 +34,17 @@ class EnsembleOutput {
   void require_writable(const std::string& scenario) const;
   /// Whether the file has all members already: another shard has just written it, or it was there before.
   bool is_complete() const;
-  /// Whether a file is replaced that neither shards share nor an interrupted ensemble has left.
+  /// Whether an existing file is replaced by an ensemble that is no shard and does not resume.
   bool replaces() const;
 
-  /// Chunks of this shard that are not done. Throws InputError if there are journals, but the run is not to go on with
-  /// them, or they belong to another ensemble. `on_all` asks all processes of a job whether that is so on each.
+  /// Chunks of this shard that are not done. Throws InputError if there are journals, and the run does not resume them,
+  /// or they belong to another ensemble. on_all(b) returns whether b is true in all processes of a job.
   std::vector<std::int64_t> find_missing(const std::function<bool(bool)>& on_all = [](bool mine) { return mine; });
   /// Members that were done before.
   std::int64_t already() const { return already_; }
 
-  /// Writes the file. Nothing if another shard has written the whole one in between: those that end at the same time
-  /// write one after the other.
+  /// Writes the file. Returns nullopt if another shard has written the complete file before: shards that end at the
+  /// same time write one after the other.
   std::optional<EnsembleTally> write() const;
   void remove_journals() const;
 

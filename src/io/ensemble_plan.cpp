@@ -26,7 +26,7 @@ std::string read_key(const Section& section) {
   return key;
 }
 
-/// Refuses keys that have no meaning beside others.
+/// Throws InputError if one of these keys is given: it has no meaning beside the others.
 void require_none(const Section& section, std::initializer_list<std::string_view> keys, const std::string& expected) {
   for (const std::string_view key : keys) {
     if (const auto entry = section.find(key)) entry->fail(expected);

@@ -28,14 +28,14 @@ struct EnsembleDraw {
   std::vector<double> values = {};  // NOLINT(readability-redundant-member-init): left out in initializers
 };
 
-/// The members of an ensemble, and what is kept of each.
+/// The members of an ensemble, and the quantities that are kept for each.
 struct EnsemblePlan {
-  std::vector<EnsembleAxis> axes;   ///< either these, the first one slowest,
-  std::vector<EnsembleDraw> draws;  ///< or these, first those at random
-  std::int64_t count = 0;           ///< of members
+  std::vector<EnsembleAxis> axes;   ///< of a grid, the first one slowest; or
+  std::vector<EnsembleDraw> draws;  ///< without a grid, random ones first
+  std::int64_t count = 0;           ///< number of members
   std::uint64_t seed = 0;
   bool chooses_method = false;    ///< the fastest one is used, whatever [run] says
-  std::vector<std::string> keep;  ///< as in the scenario; empty for what is usual
+  std::vector<std::string> keep;  ///< as in the scenario; empty for the default
   std::string keep_place;         ///< `where: key`
 
   /// Shape of the data sets: one number for each axis.

@@ -22,7 +22,7 @@ class ModelError : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-/// An opened file cannot be written: the disk is full, say.
+/// An opened file cannot be written, for example because the disk is full.
 class OutputError : public std::runtime_error {
  public:
   /// `error` is errno.

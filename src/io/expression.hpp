@@ -12,7 +12,7 @@
 
 namespace pendula::io {
 
-/// A text is not an expression. The caller adds where the text stands.
+/// A text is not an expression. The caller adds the place of the text.
 struct ExpressionError : std::runtime_error {
   ExpressionError(std::string what_was_expected, std::string what_was_got)
       : std::runtime_error(what_was_got), expected(std::move(what_was_expected)), got(std::move(what_was_got)) {}

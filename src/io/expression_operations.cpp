@@ -90,7 +90,7 @@ constexpr Operation jump(std::string_view name, Operation::Of of, Function) {
   return {name, operands_of<Function>, of, true, {&called<f, double>, &called<of_bounds, Reach>, &without_slope<f>}};
 }
 
-// Of functions that are there for other numbers, too, those of bounds.
+// Chooses the overload for bounds.
 constexpr Reach (*floor_of_bounds)(const Reach&) = &floor;
 constexpr Reach (*rint_of_bounds)(const Reach&) = &rint;
 

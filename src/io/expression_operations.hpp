@@ -8,14 +8,15 @@
 
 namespace pendula::io {
 
-/// What expressions do with numbers, with their bounds, and with their slopes.
+/// An operation of expressions, on numbers, on bounds of numbers, and on numbers with slopes.
 struct Operation {
-  /// Which models may have it: all, drives, which are smooth between pieces, or none.
+  /// Where it may stand. models: anywhere, also in feedback of models; drives: in drives, which may have pieces, and in
+  /// expressions of rows; rows: only in these.
   enum class Of { models, drives, rows };
   template <class Number>
   using Function = Number (*)(const Number& a, const Number& b, const Number& c);
 
-  std::string_view name;  ///< a sign (~: minus of one number) or what a function is called
+  std::string_view name;  ///< a sign (~: minus of one number) or the name of a function
   int operands = 0;
   Of of = Of::models;
   bool jumps = false;
@@ -30,7 +31,7 @@ struct Operation {
 
 std::span<const Operation> operations();
 
-/// The operation of this name, which may be ln; none where there is none.
+/// The operation of this name, or of ln; null if there is none.
 const Operation* operation_named(std::string_view name);
 
 }  // namespace pendula::io

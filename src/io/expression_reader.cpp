@@ -26,7 +26,7 @@ constexpr std::size_t longest_text = 10'000;
 constexpr std::size_t most_listed = 24;
 constexpr int deepest = 200;
 
-/// Signs between two operands, by how strongly they bind. None stands after one that it begins with.
+/// Signs between two operands, by how strongly they bind. A longer sign stands before its beginning: "<=" before "<".
 constexpr std::array<std::array<std::string_view, 6>, 5> signs = {
     {{"||"}, {"&&"}, {"<=", ">=", "<", ">", "==", "!="}, {"+", "-"}, {"*", "/"}}};
 

@@ -19,10 +19,10 @@
 namespace pendula::io {
 namespace {
 
-/// A column that no feedback may hold has this name, which no expression can have.
+/// The name of columns that feedback must not use: no expression can contain it.
 constexpr const char* nameless = "";
 
-/// Names of the columns that an expression may hold: all but inputs, and with `without_energy` but the energy.
+/// Names of the columns that an expression may use: all but inputs, and with `without_energy` all but the energy, too.
 std::vector<std::string> names_for(const Subject& subject, bool without_energy) {
   std::vector<std::string> names = subject.columns();
   for (const Quantity& quantity : subject.quantities()) {
@@ -41,7 +41,7 @@ auto told_at(const FeedbackPlan& plan, Read read) {
   }
 }
 
-/// What a drive's expression may hold.
+/// The names that the expression of a drive may use.
 const std::vector<std::string> time_alone{"t"};
 
 std::size_t input_of(const FeedbackPlan& plan, const Subject& subject) {
@@ -68,7 +68,7 @@ std::function<double(const Motion&)> function_of(const FeedbackPlan& plan,
   };
 }
 
-/// A program as the generator reads it: words, operands before what is done with them. `x 9 * ~` is -(x * 9).
+/// A program as the generator reads it: words in postfix order. `x 9 * ~` is -(x * 9).
 std::string postfix_text(const ExpressionProgram& program, const std::vector<std::string>& names,
                          const FeedbackPlan& plan) {
   using enum Operation::Of;

@@ -27,15 +27,15 @@ struct FeedbackPlan {
 /// Reads the values of [[system.drive]], which are laws, too. Throws InputError.
 std::vector<FeedbackPlan> read_drive_values(const Section& system);
 
-/// The same as laws in the words of the generator, which knows whether an input, or a motion, has such a name. Throws
-/// InputError if an expression cannot be read, or is not of time alone.
+/// The same as laws in the words of the generator, which checks whether an input, or a motion, has such a name. Throws
+/// InputError if an expression cannot be read, or does not depend on time alone.
 std::vector<InputLaw> drive_laws(const std::vector<FeedbackPlan>& plans);
 
-/// The unit of an input of a system, empty if it is none; that of a torque of a chain, for which there is no `system`.
+/// The unit of an input of a system; empty if it is no input. Without `system`, that of a chain's torques.
 std::string_view unit_of_input(const SystemInfo* system, std::string_view input);
 
-/// Reads the tables [[system.feedback]] or [[chain.feedback]] of [system] or [chain]. Feedback of a chain, for which
-/// there is no `info`, is always sampled. Throws InputError.
+/// Reads the tables [[system.feedback]] or [[chain.feedback]] of [system] or [chain]. Without `info`, of a chain, whose
+/// feedback is always sampled. Throws InputError.
 std::vector<FeedbackPlan> read_feedback(const Section& system, const SystemInfo* info = nullptr);
 
 /// The index of an input of a subject. Throws InputError with the place of its name.
@@ -44,7 +44,7 @@ std::size_t input_named(const std::string& input, const std::string& place, cons
 /// One plan, continuous or sampled, in the words of the generator. Throws InputError as continuous_laws.
 InputLaw law_in_words(const FeedbackPlan& plan, const Subject& subject);
 
-/// The continuous ones, in the words of the generator. Throws InputError if an expression cannot be read, names
+/// The continuous plans, in the words of the generator. Throws InputError if an expression cannot be read, names
 /// something unknown, or is not smooth.
 std::vector<InputLaw> continuous_laws(const std::vector<FeedbackPlan>& plans, const SystemSubject& system);
 
@@ -52,7 +52,7 @@ std::vector<InputLaw> continuous_laws(const std::vector<FeedbackPlan>& plans, co
 std::vector<InputFunction> continuous_functions(const std::vector<FeedbackPlan>& plans,
                                                 const std::shared_ptr<const SystemSubject>& system);
 
-/// Those that are sampled. Throws InputError as continuous_laws.
+/// The sampled plans. Throws InputError as continuous_laws.
 std::vector<SampledLaw> sampled_laws(const std::vector<FeedbackPlan>& plans,
                                      const std::shared_ptr<const Subject>& subject);
 

@@ -46,8 +46,8 @@ InputFile read_all(int descriptor, std::size_t most) {
   }
 }
 
-/// Waits until somebody has opened a pipe for writing; false if nobody does in time. A non-blocking read finds an end
-/// until then. What it reads is put into `text`.
+/// Waits until a pipe has been opened for writing; false if that takes too long. A non-blocking read finds the end of
+/// the file until then. Puts what it reads into `text`.
 bool has_writer(int pipe, std::string& text) {
   using namespace std::chrono_literals;
   for (const auto end = std::chrono::steady_clock::now() + 2s; std::chrono::steady_clock::now() < end;) {
@@ -136,7 +136,7 @@ bool has_ending_of(const std::string& file, FileFormat format) {
   return std::ranges::any_of(hdf5_endings, [&](std::string_view ending) { return file.ends_with(ending); });
 }
 
-/// A device or a pipe: rows go there as they come, whatever its name.
+/// Whether a file is a device or a pipe: rows go there as they come, whatever its name.
 bool is_stream(const std::string& file) {
   std::error_code unknown;
   const fs::file_status status = fs::status(file, unknown);

@@ -24,8 +24,8 @@ InputFile read_input_file(const std::filesystem::path& file, std::size_t most);
 /// Reads standard input in the same way.
 InputFile read_standard_input(std::size_t most);
 
-/// A file that is written under another name and then renamed, so that it is complete or absent. What is no regular
-/// file, as /dev/stdout, is written directly.
+/// A file that is written under another name and then renamed, so that it is complete or absent. A device or pipe, as
+/// /dev/stdout, is written directly.
 class WholeFile {
  public:
   /// Opens the file for writing; an existing file stays until `write`. Throws InputError if it cannot be opened.
@@ -52,8 +52,8 @@ std::string link_target(const std::string& name);
 /// Formats of files of numbers.
 enum class FileFormat { csv, hdf5 };
 
-/// The format by the ending of the name: CSV for .csv, for "-", and for anything that is no regular file, as
-/// /dev/stdout; HDF5 for .h5, .hdf5 and .nc. Throws InputError with the list on any other name.
+/// The format by the ending of the name: CSV for .csv, for "-", and for devices and pipes, as /dev/stdout; HDF5 for
+/// .h5, .hdf5 and .nc. Throws InputError with the list for any other name.
 FileFormat format_of(const std::string& file);
 
 /// Throws InputError unless a file has the only format in which `what` can be written.
@@ -89,7 +89,7 @@ TrustedFolder trusted_folder(const std::filesystem::path& folder);
 /// Whether anybody but the owner, or a group of the user alone, may write to a file or folder.
 bool others_may_write(const struct stat& status);
 
-/// A file of the system, closed when it goes; negative where it could not be opened.
+/// A file descriptor, closed by the destructor; negative if the file could not be opened.
 class Descriptor {
  public:
   explicit Descriptor(int number) : number_(number) {}

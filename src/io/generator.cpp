@@ -49,7 +49,7 @@ Ended ended_generator(const std::vector<std::string>& arguments, const Toolchain
 std::string read_model(const fs::path& file) {
   constexpr std::size_t most = std::size_t{16} << 20;
   std::error_code unknown;
-  InputFile read{{}, "neither a file nor a link to one"};  // Python reads it, too: no pipe
+  InputFile read{{}, "neither a file nor a link to one"};  // no pipe, since Python reads the file, too
   if (fs::is_regular_file(file, unknown) || !fs::exists(file, unknown)) read = read_input_file(file, most);
   if (read.problem.empty()) return std::move(read.text);
   throw ModelError("expected a model file that can be read, got " + file.string() + ": " + read.problem);
@@ -70,7 +70,7 @@ fs::path find_model(const ModelName& name, const Toolchain& toolchain) {
 std::string run_generator(const std::vector<std::string>& arguments, const Toolchain& toolchain) {
   const Ended ended = ended_generator(arguments, toolchain);
   if (ended.status == 0) return ended.output;
-  // A model may print, too: what it prints may come later.
+  // The last such line counts, and only its text: a model may print, too.
   constexpr std::string_view told = "\npendula_codegen: error: ";
   const std::string output = '\n' + ended.output;
   const std::size_t at = output.rfind(told);

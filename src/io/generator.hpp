@@ -21,7 +21,7 @@ std::string read_model(const std::filesystem::path& file);
 /// Arguments for a generator command on a model.
 std::vector<std::string> about(const char* command, const ModelName& name, const Toolchain& toolchain);
 
-/// Runs the generator and returns what it prints. Fails, too, if no suitable Python is there.
+/// Runs the generator and returns its output. Fails, too, if there is no suitable Python.
 std::string run_generator(const std::vector<std::string>& arguments, const Toolchain& toolchain);
 
 /// Values of a model's functions at a start, as the generator derives them from the model's text; KernelComparison

@@ -1,4 +1,4 @@
-// Files, attributes, and data sets of text; those of numbers are in hdf5_rows.cpp.
+// Files, attributes, and data sets of text; hdf5_tables.cpp has those of numbers.
 
 #include "io/hdf5.hpp"
 

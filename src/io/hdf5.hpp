@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-/// HDF5 files with errors as exceptions, identifiers that close themselves, and no word on standard error.
+/// HDF5 files with errors as exceptions, identifiers that close themselves, and no output on standard error.
 namespace pendula::io::hdf5 {
 
 /// A call to HDF5 failed; the message is that of the deepest failing call.
@@ -42,9 +42,9 @@ class Handle {
   }
 
   Id get() const { return id_; }
-  /// Never closes it: closing would write, which has failed.
+  /// Gives the identifier up without closing it: closing would write, which has failed.
   void abandon() { id_ = -1; }
-  /// Closes it; false if that failed.
+  /// Closes the identifier; false if that failed.
   bool close() { return id_ < 0 || close_(std::exchange(id_, -1)) >= 0; }
 
  private:
@@ -59,11 +59,11 @@ Handle create_file(const std::string& file);
 /// Opens a file for reading, even while another process writes it.
 Handle open_file(const std::string& file);
 
-/// From now on others may read the file while it is written; no objects can be added any more.
+/// From now on other processes may read the file while it is written; no objects can be added any more.
 void let_others_read(const Handle& file);
 
-/// Writes what HDF5 has buffered, and marks the file as closed. Without the mark, the file of a killed program would be
-/// refused as incomplete. It is complete: in this way of writing (SWMR), a part is written only after what it points
+/// Writes what HDF5 has buffered, and marks the file as closed: without the mark, HDF5 refuses the file of a killed
+/// program as incomplete. It is complete, because this way of writing (SWMR) writes a part only after what it points
 /// to.
 void flush(const Handle& file, const std::string& name);
 
@@ -84,7 +84,7 @@ std::int64_t read_number(const Handle& object, const std::string& name);
 void write_text(const Handle& where, const std::string& name, const std::string& text);
 std::string read_text(const Handle& where, const std::string& name);
 
-/// Whole numbers 1, 2, … that count the links.
+/// Makes a vector of the numbers 1, 2, … of the links.
 Handle create_numbering(const Handle& where, const std::string& name, std::size_t count);
 
 /// One number.
@@ -128,9 +128,9 @@ void write_rows(const Handle& table, std::size_t first, std::span<const double> 
 
 /// Reserves `room` bytes for a text that can be written while others read the file.
 Handle create_late_text(const Handle& where, const std::string& name, std::size_t room);
-/// Writes that text; nothing if it is too long.
+/// Writes that text; writes nothing if it is too long.
 void write_late_text(const Handle& dataset, const std::string& text);
-/// Reads it; empty where nothing was written.
+/// Reads that text; empty if none was written.
 std::string read_late_text(const Handle& where, const std::string& name);
 
 }  // namespace pendula::io::hdf5

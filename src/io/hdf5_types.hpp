@@ -13,7 +13,7 @@ namespace pendula::io::hdf5 {
 Handle property_list(hid_t of);
 Handle text_type();
 Handle space_of(std::span<const hsize_t> extent, const hsize_t* most = nullptr);
-/// Of one value.
+/// The data space of one value.
 Handle single_space();
 
 /// The type of numbers in the file.

@@ -55,7 +55,8 @@ class Journal {
   Clock::time_point synced_ = Clock::now();
 };
 
-/// A lock on a folder, held by one process at a time; the constructor waits for it. The folder may be gone by then.
+/// A lock on a folder, held by one process at a time. The constructor waits for it; the folder may have been removed by
+/// then.
 class FolderLock {
  public:
   /// Throws InputError where the folder cannot be written.

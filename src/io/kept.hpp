@@ -12,7 +12,7 @@
 
 namespace pendula::io {
 
-/// What is kept of every member of an ensemble.
+/// The quantities that are kept for every member of an ensemble.
 class KeptQuantities {
  public:
   /// Throws InputError if the ensemble asks for an unknown quantity.
@@ -43,7 +43,7 @@ class KeptQuantities {
   struct Column {
     EnsembleColumn column;
     Source source;
-    std::size_t index = 0;  // of a column of the row, or of an event
+    std::size_t index = 0;  // index of a column of the row, or of an event
   };
 
   void add(const std::string& what, const std::string& place, const std::vector<Quantity>& quantities,

@@ -191,8 +191,8 @@ bool is_sealed(std::string_view file) {
   return file.substr(file.size() - size) == seal_of(file.substr(0, file.size() - size));
 }
 
-/// A path to an open file, each time another one. The loader takes objects of one name for one, and need not unload
-/// what is closed: if the path were that of the descriptor alone, a later kernel could turn out to be an earlier one.
+/// A path to an open file, a different one each time. The loader takes files of one name for the same object, and may
+/// keep closed ones: with the path of the descriptor alone, a later kernel could turn out to be an earlier one.
 std::string new_path(const Descriptor& file) {
   static std::atomic<std::uint64_t> paths = 0;
   std::string path = "/proc/self/fd";

@@ -38,8 +38,8 @@ void seal_kernel(const std::filesystem::path& file);
 /// The program of an interpreted kernel in its file, without the seal. Throws ModelError.
 std::string program_in(const std::filesystem::path& kept);
 
-/// Loads a kernel. Returns null where there is no file; and null, and says why in `problem`, unless the file is
-/// complete, the user's own, closed to what others may write, and of this version.
+/// Loads a kernel. Returns null if there is no file. Returns null, with the reason in `problem`, unless the file is
+/// complete and of this version, belongs to the user, and nobody else may write it.
 std::shared_ptr<const SystemTable> load_kernel(const std::filesystem::path& kept, const Toolchain& toolchain,
                                                std::string& problem);
 

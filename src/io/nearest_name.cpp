@@ -24,7 +24,7 @@ std::size_t edit_distance(std::string_view a, std::string_view b) {
   return d[a.size()][b.size()];
 }
 
-/// The candidate that begins with `name`: "masses" for "mass".
+/// A candidate that begins with `name`: "masses" for "mass".
 std::string_view begun_name(std::string_view name, std::span<const std::string_view> candidates) {
   constexpr std::size_t fewest_letters = 3;
   if (name.size() < fewest_letters) return {};

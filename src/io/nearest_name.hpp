@@ -6,10 +6,8 @@
 
 namespace pendula::io {
 
-/// The candidate most like `name`, for "did you mean …?"; empty where none is near enough to be meant.
-///
-/// Like means few insertions, deletions, replacements and swaps of neighbours: about one in three letters. Where there
-/// is none, the one that begins with `name`.
+/// The candidate nearest to `name`, for "did you mean …?". It needs few insertions, deletions, replacements and swaps
+/// of neighbours, about one in three letters. If there is none, a candidate that begins with `name`; else empty.
 std::string_view nearest_name(std::string_view name, std::span<const std::string_view> candidates);
 
 /// `" (did you mean NAME?)"`; empty for an empty name.

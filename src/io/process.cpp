@@ -26,7 +26,7 @@ std::vector<char*> pointers(std::vector<std::string>& texts) {
   return pointers;
 }
 
-/// How often a program that waits for another asks whether it should, in milliseconds.
+/// Time between calls of ask() while waiting for another program  [ms].
 constexpr int patience = 50;
 
 std::string read_all(int descriptor, const std::function<void()>& ask) {
@@ -108,7 +108,7 @@ bool comes_to_an_end(const std::function<void()>& action) {
   setrlimit(RLIMIT_CORE, &no_core);
   constexpr itimerval half_a_second{{0, 0}, {0, 500'000}}, half_a_minute{{0, 0}, {30, 0}};
   setitimer(ITIMER_PROF, &half_a_second, nullptr);
-  setitimer(ITIMER_REAL, &half_a_minute, nullptr);  // a lock that a thread held which is not here
+  setitimer(ITIMER_REAL, &half_a_minute, nullptr);  // for a lock held by a thread that this process does not have
   try {
     action();
   } catch (...) {  // the caller will meet the same exception

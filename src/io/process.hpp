@@ -15,16 +15,16 @@ struct Ended {
 /// The last line of a program's output; empty if there is none.
 std::string last_line(const std::string& output);
 
-/// Runs a program and waits for it. Meanwhile it calls ask() many times a second, if there is one; what that throws
-/// ends the program.
+/// Runs a program and waits for it. Calls ask(), if given, many times a second meanwhile; if that throws, the program
+/// is ended.
 Ended run_process(const std::vector<std::string>& command, const std::function<void()>& ask = {});
 
 /// Runs a program with this program's standard streams. Returns its exit status.
 int run_attached(const std::vector<std::string>& command);
 
-/// Whether `action` ends in a child process within half a second of processor time, in whatever way. Guards against
-/// libraries that loop forever on damaged files. Other threads do not run there: a lock that one holds ends it, after
-/// half a minute.
+/// Whether `action` ends, in whatever way, in a child process within half a second of processor time. Guards against
+/// libraries that loop forever on damaged files. Other threads do not exist there: if it waits for a lock of one, it is
+/// ended after half a minute.
 bool comes_to_an_end(const std::function<void()>& action);
 
 }  // namespace pendula::io

@@ -24,7 +24,7 @@ struct Dimension {
   }
 };
 
-/// What a unit is in SI.
+/// A unit in SI: its dimension and its size.
 struct Measure {
   Dimension dimension;
   double size = 1;
@@ -115,7 +115,7 @@ std::optional<Measure> read_factor(std::string_view text, int sign) {
   return found;
 }
 
-/// Products and quotients, as UDUNITS has them: `kg m^2`, `N m s/rad`. Nothing if some unit is not known.
+/// Reads products and quotients, as UDUNITS has them: `kg m^2`, `N m s/rad`. nullopt if a unit is not known.
 std::optional<Measure> read_unit(std::string_view text) {
   Measure all;
   int sign = 1;
@@ -135,13 +135,13 @@ std::optional<Measure> read_unit(std::string_view text) {
   return all;
 }
 
-/// Torques and what belongs to them may be by rad or not, as they are written.
+/// Whether two dimensions are of one kind. Those with mass, such as torques, may be written per rad or not.
 bool is_same_kind(Dimension a, Dimension b) {
   if (a.kg != 0) a.rad = b.rad = 0;
   return a == b;
 }
 
-/// With the degree sign as a unit.
+/// The unit with "deg" for the degree sign.
 std::string plain_name(std::string_view unit) {
   std::string name(unit);
   if (name.starts_with(degree_sign)) name.replace(0, degree_sign.size(), "deg");

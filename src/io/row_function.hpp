@@ -25,7 +25,7 @@ class RowFunction : public Formula {
  public:
   RowFunction(std::shared_ptr<const Subject> subject, std::shared_ptr<Expression> expression, const Motion& start)
       : subject_(std::move(subject)), expression_(std::move(expression)), numbers_(columns().size()) {
-    std::size_t of_motion = std::numeric_limits<std::size_t>::max();  // columns before points and energy
+    std::size_t of_motion = std::numeric_limits<std::size_t>::max();  // first column of points or energy
     for (const Quantity& quantity : subject_->quantities()) {
       const bool is_observed = quantity.role == Role::point || quantity.role == Role::energy;
       if (is_observed) of_motion = std::min(of_motion, quantity.first);
@@ -79,7 +79,7 @@ class RowFunction : public Formula {
 
   const std::vector<std::size_t>& columns() const { return expression_->columns(); }
 
-  /// Where a number of a row stands in a motion.
+  /// The place of a number of a row in a motion.
   struct MotionIndex {
     enum class Of { time, coordinates, rates } of = Of::time;
     Eigen::Index index = 0;
@@ -89,8 +89,8 @@ class RowFunction : public Formula {
     return (place.of == MotionIndex::Of::coordinates ? motion.q : motion.v)[place.index];
   }
 
-  /// Finds the indices of all numbers of the expression, or none where one of them is not part of a motion. They are
-  /// read off a row: that of a motion whose numbers are their own indices.
+  /// Finds the places of all numbers of the expression, or none if one of them is not part of a motion. It reads them
+  /// off the row of a motion whose numbers are their own indices.
   void find_places(Motion motion) {
     const auto count = static_cast<double>(motion.q.size());
     motion.q.setLinSpaced(1, count);
@@ -113,7 +113,7 @@ class RowFunction : public Formula {
     subject_->append_row(motion, observes_ ? subject_->observe(motion) : Observation(), row_);
   }
 
-  /// In the order of columns.
+  /// Puts the time and the other numbers into `all`, in the order of columns.
   template <class Number>
   std::span<const Number> with_time(const Number& time, std::span<const Number> others, std::vector<Number>& all) {
     auto other = others.begin();

@@ -33,8 +33,8 @@ Eigen::VectorXd point_velocities(const ChainSubject<Space>& subject, const Motio
   return bob_velocities(subject.chain(), motion).reshaped();
 }
 
-/// Points change by a coordinate as fast as they move by its rate: their velocities are linear in rates.
-/// (components x (1 + coordinates)): by time, then by coordinates.
+/// Derivatives of points with respect to time, then coordinates, (components x (1 + coordinates)). Velocities of points
+/// are linear in rates, so that one at unit rate is the derivative.
 Eigen::MatrixXd point_slopes(const Subject& subject, Motion motion) {
   const Eigen::Index count = motion.q.size();
   const auto velocities = [&] {
@@ -52,7 +52,7 @@ Eigen::MatrixXd point_slopes(const Subject& subject, Motion motion) {
   return slopes;
 }
 
-/// How each column of a row changes, (columns x (1 + state + inputs)); energies are left out.
+/// Derivatives of each column of a row, (columns x (1 + state + inputs)); energies are left out.
 Eigen::MatrixXd column_slopes(const Subject& subject, const Motion& motion, std::size_t inputs) {
   const std::vector<std::size_t> state = state_columns(subject);
   const Eigen::Index size = static_cast<Eigen::Index>(state.size());
@@ -80,7 +80,7 @@ Eigen::MatrixXd column_slopes(const Subject& subject, const Motion& motion, std:
   return slopes;
 }
 
-/// Why an expression has no slopes; empty where it has.
+/// Why an expression has no derivatives; empty if it has some.
 std::string against_slopes(const Subject& subject, const Expression& expression, const std::string& text) {
   if (expression.may_jump()) return "expected an expression that does not jump, got " + text;
   const std::vector<std::size_t> fed = subject.fed_columns();

@@ -9,18 +9,17 @@
 
 namespace pendula::io {
 
-/// Derivatives of expressions in the columns of a row at a motion, exactly: one row for each expression.
+/// Exact derivatives of expressions in the columns of a row, at a motion: one row for each expression.
 struct RowSlopes {
   Eigen::VectorXd by_time;
   Eigen::MatrixXd by_state, by_inputs;  ///< coordinates, then rates, in the order of state_columns; inputs
 };
 
-/// Throws ExpressionError, and std::invalid_argument for an expression that may jump, that holds the energy, or an
+/// Throws ExpressionError; and std::invalid_argument for an expression that may jump, or that contains the energy or an
 /// input to which feedback adds.
 RowSlopes row_slopes(const Subject& subject, const Motion& motion, std::span<const std::string> expressions);
 
-/// Names of what is measured where nothing else is asked for: the components of points, and own columns that have
-/// slopes.
+/// Names of the default measurements: the components of points, and own columns that have derivatives.
 std::vector<std::string> point_columns(const Subject& subject);
 
 }  // namespace pendula::io

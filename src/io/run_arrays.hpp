@@ -21,28 +21,28 @@ struct RunContents {
   std::vector<Constant> constants;
   std::vector<std::string> events;  ///< names of the events that the run looks for
   std::optional<NaturalUnits> natural;
-  /// What points are drawn as, JSON (view/scene.hpp); empty of a chain.
+  /// What points are drawn as, JSON (view/scene.hpp); empty for a chain.
   std::string drawing = {};  // NOLINT(readability-redundant-member-init): left out in initializers
 };
 
-/// Attributes that tell a unit as UDUNITS knows it, and beside it the natural unit.
+/// Attributes with a unit as UDUNITS knows it, and with the natural unit.
 std::vector<std::pair<std::string, std::string>> unit_attributes(const std::optional<NaturalUnits>& natural,
                                                                  const std::string& unit);
-/// Writes them.
+/// Writes these attributes.
 void write_unit(const hdf5::Handle& array, const std::optional<NaturalUnits>& natural, const std::string& unit);
 
 /// Makes the scale of the axis of links, if any array has that axis.
 hdf5::Handle create_links(const hdf5::Handle& file, const RunContents& contents);
 
-/// Numbers in a row of quantities.
+/// How many numbers a row of quantities has.
 std::size_t columns_in(const std::vector<Quantity>& quantities);
 
 /// Reads rows, one after the other; NaN for a quantity that an older file lacks. Throws ChangedFile.
 std::vector<double> read_block(const hdf5::Handle& where, const std::vector<Quantity>& quantities, std::size_t first,
                                std::size_t rows);
 
-/// Reads events of the group `events` of a run file, one after the other: each is its number, which event it is, from 1
-/// on, whether it went up, and the row at that instant. Throws ChangedFile.
+/// Reads events of the group `events` of a run file, one after the other. Each has its number, the index of the event
+/// (from 1), whether it went up, and the row at that instant. Throws ChangedFile.
 std::vector<std::vector<double>> read_events(const hdf5::Handle& group, const std::vector<Quantity>& quantities,
                                              std::size_t first, std::size_t count);
 /// How many events that group has, and their names.
@@ -60,7 +60,7 @@ class EventList {
   void add(const EventRow& happened);
   bool is_there() const { return !datasets_.empty(); }
   std::size_t count() const { return written_ + pending_.size(); }
-  /// Their checksum.
+  /// The checksum of all events.
   double check() const;
   void write();
   void close();

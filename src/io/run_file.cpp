@@ -20,13 +20,14 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Contents of the file of a resumed run: it has events only if it had them from the beginning.
+/// What the file of a resumed run contains. If the file that it goes on from has no table of events, the new one gets
+/// none.
 RunContents going_on(RunContents contents, const SavedRun& saved) {
   if (saved.checkpoint && !saved.has_events) contents.events.clear();
   return contents;
 }
 
-/// Rows in a chunk: all runs with the same columns have the same; few columns make chunks of about 32 kB.
+/// Rows in a chunk. They depend on the number of columns only; few columns make chunks of about 32 kB.
 std::size_t chunk_rows(std::size_t columns) {
   constexpr std::size_t block = std::size_t{1} << 17;
   return std::clamp<std::size_t>(block / std::max<std::size_t>(columns, 1), 4, 4096);
@@ -58,7 +59,7 @@ RunFile::~RunFile() {
     close();
   } catch (...) {  // finish() reports it
   }
-  if (path_ != target_) unlink(path_.c_str());  // not finished: the file that it should replace stays
+  if (path_ != target_) unlink(path_.c_str());  // not finished: the file that it was to replace stays
 }
 
 void RunFile::open_part(const std::string& name) {
@@ -273,7 +274,7 @@ void RunFile::close() {
   if (!closed || !released) throw OutputError(name_, "HDF5 could not close it");
 }
 
-/// Leaves the file as it was flushed last.
+/// Gives the file up: it stays as it was at the last flush.
 void RunFile::abandon() {
   checkpoints_.abandon();
   summary_.abandon();

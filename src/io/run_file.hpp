@@ -17,16 +17,16 @@
 
 namespace pendula::io {
 
-/// Writes a run file without rows, from which a run can go on. Throws InputError if it cannot be opened, OutputError if
-/// it cannot be written.
+/// Writes a run file without rows, from which a run can be resumed. Throws InputError if it cannot be opened,
+/// OutputError if it cannot be written.
 void write_saved_run(const std::string& file, const RunOrigin& origin, const Checkpoint& checkpoint);
 
 /// A run as an HDF5 file: quantities with units, the scenario, and a checkpoint. It can be read at any time; a killed
 /// program loses at most the rows of the last two seconds. docs/reference/run-file.md.
 class RunFile : public RowsFile {
  public:
-  /// Begins a file beside `name`, which replaces it once it can be read. Throws InputError if `name` cannot be written,
-  /// or another process writes it.
+  /// Begins a file beside `name`, which replaces `name` once it can be read. Throws InputError if `name` cannot be
+  /// written, or another process writes it.
   RunFile(const std::string& name, const RunOrigin& origin, RunContents contents);
 
   /// The same, beginning with the rows and events of the file `from` up to its checkpoint. Throws InputError, too, if

@@ -42,7 +42,7 @@ void require_same(const std::string& file, const std::string& what, const std::s
   throw InputError(file + ": expected a run of " + what + " " + here + ", got one of " + got);
 }
 
-/// Throws InputError unless the solver is the one of the checkpoint: it may depend on the kernels of a build.
+/// Throws InputError unless the solver is that of the checkpoint; it may depend on the kernels of a build.
 void require_same_solver(const RunOrigin& began, const RunOrigin& here) {
   if (began.solver == here.solver && began.kernel == here.kernel) return;
   const auto told = [](const RunOrigin& origin) {
@@ -52,7 +52,7 @@ void require_same_solver(const RunOrigin& began, const RunOrigin& here) {
                    told(here) + ": go on with a build that has the same kernels");
 }
 
-/// In TOML, where 1e300 and 1 are numbers as they are.
+/// Numbers as a TOML array.
 std::string array_of(const std::vector<double>& numbers) {
   std::string text;
   for (const double number : numbers) text += (text.empty() ? "[" : ", ") + shortest(number);

@@ -18,8 +18,8 @@ struct RunSource {
   std::optional<SavedRun> saved;       ///< the run to resume
 };
 
-/// The source of a run that goes on, `saved` in `file`, with overrides of keys that may change. Throws InputError, too,
-/// if this program cannot resume the run.
+/// The source of a resumed run, `saved` in `file`, with overrides of keys that may change. Throws InputError for other
+/// keys, and if this program cannot resume the run.
 RunSource resumed_source(const std::string& file, SavedRun saved, const std::vector<std::string>& overrides);
 
 /// Throws ModelError if a saved run has another model; `model` is the text of the model's file.
@@ -34,7 +34,8 @@ std::filesystem::path model_folder(const std::string& run_file, const std::strin
 RunOrigin origin_of(const RunSource& source, const Description& description, const std::string& model,
                     const std::string& command, const std::string& title);
 
-/// The overrides of a run, and those that put numbers in place of the files of its signals: a run file needs no other.
+/// The overrides of a run, and those that put numbers in place of the files of its signals, so that a run file needs no
+/// other file.
 std::vector<std::string> overrides_with_numbers(const RunSource& source, const std::vector<SignalPlan>& signals);
 
 /// The checkpoint to resume from, for a checked scenario. Throws InputError if the scenario ends before it.

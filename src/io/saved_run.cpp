@@ -18,7 +18,7 @@
 namespace pendula::io {
 namespace {
 
-/// Fingerprint of what a run began with. Versions and solvers are not in it: a resumed run compares them itself.
+/// Fingerprint of the origin of a run, without versions and solvers: a resumed run compares these itself.
 std::uint64_t fingerprint_of(const RunOrigin& origin) {
   std::vector<std::string> texts = {origin.history, origin.scenario_name, origin.scenario, origin.model};
   texts.insert(texts.end(), origin.overrides.begin(), origin.overrides.end());
@@ -85,7 +85,7 @@ namespace {
 enum Column : std::size_t { check, serial, at_time, kept_rows, since_row, integrator_size, record_size, numbers };
 constexpr std::size_t numbers_so_far = 4;
 
-// Raised when the numbers of members get another order or other meanings while there are as many.
+// Raised when the numbers of members change their order or their meanings, but not their count.
 constexpr double layout = 1;
 
 // Rows of the table, written in turn.
@@ -112,7 +112,7 @@ std::vector<double> to_row(const Checkpoint& checkpoint, const RunSoFar& so_far,
   return row;
 }
 
-/// Empty for an older table.
+/// nullopt for an older table.
 std::optional<RunSoFar> so_far_in(std::span<const double> row) {
   const auto before = static_cast<std::size_t>(row[integrator_size] + row[record_size]) + numbers;
   if (row.size() == before) return std::nullopt;

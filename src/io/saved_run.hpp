@@ -12,7 +12,7 @@
 
 namespace pendula::io {
 
-/// Where the numbers of a run file come from: program, command, scenario, model.
+/// The origin of the numbers of a run file: program, command, scenario, model.
 struct RunOrigin {
   std::string version;                 ///< of pendula
   std::string instruction_set;         ///< of the library that ran it
@@ -26,13 +26,13 @@ struct RunOrigin {
   std::string model;                   ///< text of the model's file; empty where there is none
 };
 
-/// Writes it into a new file. Returns the group `run`.
+/// Writes an origin into a new file. Returns the group `run`.
 hdf5::Handle write_origin(const hdf5::Handle& file, const RunOrigin& origin);
 
-/// Reads it from a file and its group `run`. Throws ChangedFile, hdf5::Error, nlohmann::json::exception.
+/// Reads the origin from a file and its group `run`. Throws ChangedFile, hdf5::Error, nlohmann::json::exception.
 RunOrigin read_origin(const hdf5::Handle& file, const hdf5::Handle& run);
 
-/// Throws ChangedFile unless it matches its checksum.
+/// Throws ChangedFile unless the origin matches its checksum.
 void require_written(const RunOrigin& origin, const hdf5::Handle& run);
 
 /// How many events a run file had at a checkpoint, and checksums of its rows and events.
@@ -41,7 +41,7 @@ struct RunSoFar {
   double rows_check = 0, events_check = 0;  ///< checksums
 };
 
-/// A checkpoint as it stands in a run file.
+/// A checkpoint as a run file has it.
 struct KeptCheckpoint {
   Checkpoint checkpoint;
   std::optional<RunSoFar> so_far;  ///< older files have none
@@ -77,7 +77,7 @@ struct SavedRun {
   bool has_events = true;
 };
 
-/// Reads all that a run needs to go on. Throws InputError if the file is no run file, or is damaged.
+/// Reads all that is needed to resume a run. Throws InputError if the file is no run file, or is damaged.
 SavedRun read_saved_run(const std::string& file);
 
 /// Calls act(), which reads the run file `file`; errors of reading become InputError.

@@ -79,7 +79,7 @@ std::string expected_number(Bound bound) {
   return expected;
 }
 
-/// Angles are often strings. Other quantities are called that where somebody wrote one.
+/// " or a string …" for messages: always for angles, for other quantities only if a string was given.
 std::string or_a_string(std::string_view unit, bool is_string) {
   const std::string strings = strings_in(unit);
   const bool is_usual = strings != unit;

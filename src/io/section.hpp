@@ -17,7 +17,7 @@
 
 namespace pendula::io {
 
-/// How the place of an override begins.
+/// The beginning of the place of an override.
 inline constexpr std::string_view override_prefix = "--set ";
 
 /// The beginning of a message: `file:line`, or `--set key=value`.
@@ -40,7 +40,7 @@ std::string shown(const toml::node& node);
 /// The number of links, and the key that it follows from.
 struct LinkCount {
   int links = 0;
-  std::string told_by;  ///< key
+  std::string told_by;  ///< the key
   std::string place;    ///< `where: key`
 };
 
@@ -51,7 +51,7 @@ class Entry {
   Entry(const toml::node& node, std::string name, const ScenarioKey& key, const BaseUnits& base = {})
       : node_(&node), name_(std::move(name)), key_(&key), base_(base) {}
 
-  /// Its key with all tables and elements.
+  /// The key of the entry with all tables and elements.
   const std::string& name() const { return name_; }
   bool is_array() const { return node_->is_array(); }
   bool is_number() const { return node_->is_number(); }
@@ -62,10 +62,10 @@ class Entry {
   std::size_t size() const { return node_->is_array() ? node_->as_array()->size() : 0; }
   /// Element of an array, counted from 0 here, and from 1 in messages.
   Entry element(std::size_t index) const;
-  /// A value of a table by a name that it has.
+  /// A value of a table by its name, which must exist.
   Entry member(std::string_view name) const;
 
-  /// A number, or a string with a number and a unit of the kind of `unit`, that of the key if there is none.
+  /// A number, or a string with a number and a unit of the kind of `unit`; if that is empty, of the key's unit.
   double number(std::string_view unit = {}) const;
   bool truth() const;
   std::int64_t integer() const { return integer(key_->least, key_->most); }
@@ -100,8 +100,8 @@ class Section {
   explicit Section(const toml::table& document);
   /// The table at this key of `parent`, which may be missing.
   Section(const Section& parent, std::string_view key);
-  /// A table with the keys of a model, say. Like the others it throws InputError if `entry` is no table, or has an
-  /// unknown key.
+  /// A table with other keys, such as those of a model. Like the others it throws InputError if `entry` is no table, or
+  /// has an unknown key.
   Section(const Entry& entry, std::span<const ScenarioKey> keys);
   Section(const Section& parent, std::string_view key, std::span<const ScenarioKey> keys);
 
@@ -118,7 +118,7 @@ class Section {
   std::int64_t integer(std::string_view key) const;
   bool truth(std::string_view key) const;
   std::size_t choice(std::string_view key) const;
-  /// The default is for all links.
+  /// One number a link, or the default for all links.
   Eigen::VectorXd per_link(std::string_view key, const LinkCount& count, std::string_view unit = {}) const;
 
   /// An option by its name.
@@ -129,7 +129,7 @@ class Section {
 
   const std::string& where() const { return where_; }
 
-  /// From now on plain numbers are in these units, also in the tables within.
+  /// From now on plain numbers are in these units, in the tables within, too.
   void measure_in(const BaseUnits& base) { base_ = base; }
 
  private:

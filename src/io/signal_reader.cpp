@@ -21,11 +21,11 @@
 namespace pendula::io {
 namespace {
 
-/// Columns of a CSV file that somebody measured.
+/// Columns of a CSV file of measurements.
 struct NumberTable {
   std::string file;
-  std::vector<std::vector<double>> columns;  ///< as they were asked for
-  std::vector<std::int64_t> lines;           ///< of each row, counted from 1
+  std::vector<std::vector<double>> columns;  ///< in the order asked for
+  std::vector<std::int64_t> lines;           ///< line of each row, counted from 1
 
   /// `file:line` of a row.
   std::string place(std::size_t row) const { return line_place(file, lines[row]); }
@@ -67,7 +67,7 @@ double number_in(std::string_view cell, const std::string& place, const std::str
                    (cell.empty() ? "nothing" : toml_string(cell)));
 }
 
-/// Goes through the lines that are not blank: take(line, number).
+/// Calls take(line, number) for every line that is not blank.
 template <class Take>
 void for_lines(std::string_view text, Take take) {
   std::int64_t number = 0;
@@ -81,8 +81,8 @@ void for_lines(std::string_view text, Take take) {
   }
 }
 
-/// Reads some columns by their names, which are in the first line; blank lines are left out. Throws InputError with
-/// file, line and column.
+/// Reads some columns by their names, which are in the first line; skips blank lines. Throws InputError with file, line
+/// and column.
 NumberTable read_number_table(const std::filesystem::path& file, const std::vector<std::string>& columns) {
   const InputFile read = read_input_file(file, most_text);
   NumberTable table{file.string(), std::vector<std::vector<double>>(columns.size()), {}};

@@ -14,8 +14,8 @@ namespace pendula::io {
 /// A table [[system.signal]] or [[chain.signal]] of a scenario, with its numbers.
 struct SignalPlan {
   std::string input;
-  std::string input_place;  ///< where the name of the input stands, as `where: key`, for later errors
-  Signal signal;            ///< of no input yet
+  std::string input_place;  ///< the place of the input's name, as `where: key`, for later errors
+  Signal signal;            ///< its input is not set yet
 };
 
 /// Reads [[NAME.signal]] of the table of a system or a chain; files are relative to `folder`. Throws InputError.

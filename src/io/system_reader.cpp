@@ -20,7 +20,7 @@ std::string listed(std::span<const std::string_view> names) {
   return text.empty() ? "none" : text;
 }
 
-/// The keys of system.parameters; not of those that tell pieces of functions, which the run gives.
+/// The keys of system.parameters, without the parameters that the run sets: those that tell pieces of functions.
 std::vector<ScenarioKey> parameter_keys(const SystemInfo& info) {
   std::vector<ScenarioKey> keys(info.own_parameters());
   for (std::size_t k = 0; k < keys.size(); ++k) {
@@ -101,7 +101,7 @@ class StartTable {
   Eigen::VectorXd rates() const {
     return read(rate_name, [](std::string_view unit) { return rate_unit(unit); });
   }
-  /// A coordinate's momentum times its rate is an energy.
+  /// The momenta. Their units follow from that: a momentum times the rate of its coordinate is an energy.
   Eigen::VectorXd momenta() const {
     return read(momentum_of, [](std::string_view unit) { return "N m s/" + std::string(unit); });
   }
@@ -198,7 +198,7 @@ Motion read_start(const Section& root, const SystemSubject& system) {
   return start;
 }
 
-/// Names each key once.
+/// Warnings of angles that were probably meant in degrees, one for each key.
 std::vector<std::string> degree_warnings(const Section& root, const SystemInfo& info) {
   const StartTable table(root, info);
   std::vector<std::string> warnings;
@@ -211,7 +211,7 @@ std::vector<std::string> degree_warnings(const Section& root, const SystemInfo& 
   return warnings;
 }
 
-/// What drives make of motions, which are no inputs of a kernel.
+/// Columns for drives of motions, which are not inputs of a kernel.
 std::vector<ColumnPlan> motion_columns(const std::vector<FeedbackPlan>& drives, const SystemSubject& system) {
   std::vector<ColumnPlan> columns;
   for (const FeedbackPlan& drive : drives) {
@@ -226,7 +226,7 @@ std::vector<ColumnPlan> motion_columns(const std::vector<FeedbackPlan>& drives, 
   return columns;
 }
 
-/// Where a scenario says what a model refuses: the drive of something that it does not have, or the model.
+/// The place in a scenario of what a model refuses: the drive of something that the model does not have, or the model.
 std::string place_of(std::string_view refused, const std::vector<FeedbackPlan>& drives, const Entry& model) {
   for (const FeedbackPlan& drive : drives) {
     if (refused.ends_with("; got " + drive.input)) return drive.input_place;

@@ -9,7 +9,7 @@
 
 namespace pendula::io {
 
-/// A warning of an angle of [start], or of an array of angles, that is a short plain number beyond one turn, and
+/// A warning for an angle of [start], or an array of angles, that is a short plain number beyond one turn: it was
 /// probably meant in degrees.
 std::optional<std::string> warning_of_degrees(const Entry& entry);
 

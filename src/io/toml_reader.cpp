@@ -43,7 +43,7 @@ std::size_t string_end(std::string_view text, std::size_t begin) {
 }
 
 /// The first line, from 1, of TOML text in which a key has more than `max_nesting` parts, or a value is nested deeper;
-/// 0 if there is none. To be asked before parsing: a recursive parser would exhaust the stack on such text.
+/// 0 if there is none. Call before parsing: a recursive parser would exhaust the stack on such text.
 int line_nested_too_deep(std::string_view text) {
   int depth = 0, dots = 0, line = 1;
   for (std::size_t i = 0; i < text.size(); ++i) {
@@ -179,14 +179,16 @@ toml::table parse(std::string_view text, const std::string& name) {
   }
 }
 
-/// A bare word that stands for a string: it begins with a letter, and has no characters that TOML uses.
+/// Whether a text is a bare word that counts as a string: it begins with a letter, and has no characters of TOML's
+/// syntax.
 bool is_bare_word(std::string_view text) {
   const auto is_letter = [](char c) { return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z'); };
   return !text.empty() && is_letter(text.front()) &&
          std::ranges::all_of(text, [](char c) { return is_key_character(c) || c == '.'; });
 }
 
-/// What stands for a string without quotes: a bare word, or a number with a unit, whose quotes the shell has removed.
+/// Whether a text counts as a string without quotes: a bare word, or a number with a unit. The shell has removed
+/// quotes.
 bool is_bare_string(std::string_view text) {
   if (is_bare_word(text)) return true;
   const auto in_a_unit = [](char c) {

@@ -23,8 +23,7 @@ toml::table parse_toml(std::string_view text, std::string_view name, std::span<c
 /// Applies one override. Throws InputError.
 void apply_override(toml::table& root, const std::string& text);
 
-/// Sets one key to a number, as an override does. For the many copies of a document, whose nodes do not know their
-/// places.
+/// Sets one key to a number, as an override does. For the many copies of a document: their nodes have no places.
 void set_number(toml::table& root, std::string_view key, double number);
 
 }  // namespace pendula::io

@@ -20,8 +20,8 @@ std::string environment(const char* name, const std::string& otherwise) {
   return value == nullptr || *value == '\0' ? otherwise : std::string(value);
 }
 
-/// Empty if the environment names none. As XDG says, relative paths are ignored: they would depend on the working
-/// folder.
+/// The folder of caches; empty if the environment names none. As XDG says, relative paths are ignored: they would
+/// depend on the working folder.
 fs::path cache_folder() {
   const fs::path kept = environment("XDG_CACHE_HOME", ""), home = environment("HOME", "");
   if (kept.is_absolute()) return kept / "pendula";

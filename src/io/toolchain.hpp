@@ -33,20 +33,20 @@ struct Toolchain {
   std::filesystem::path codegen;   ///< folder of the Python package pendula_codegen
   std::filesystem::path plotting;  ///< folder of the Python package pendula_plot
   std::filesystem::path examples;  ///< folder of the scenarios that come with pendula
-  std::filesystem::path library;  ///< the static library of pendula, whether it is there or not; empty if there is none
-  std::filesystem::path headers;  ///< folder of pendula/pendula.h
-  std::filesystem::path cache;    ///< folder of kernels; empty if there is none
-  std::function<void()> ask;      ///< called while other programs work, if there is one; what it throws ends them
+  std::filesystem::path library;   ///< the static library of pendula, which may not exist; empty if unknown
+  std::filesystem::path headers;   ///< folder of pendula/pendula.h
+  std::filesystem::path cache;     ///< folder of kernels; empty if there is none
+  std::function<void()> ask;       ///< called, if given, while other programs run; if it throws, they are ended
 
-  /// Runs the generator in this process, if there is one; returns nothing where `python` has to.
+  /// Runs the generator in this process, if given. Returns nullopt if `python` has to run it.
   std::function<std::optional<Ended>(const std::vector<std::string>& arguments)> generate;
   Llvm llvm;  ///< functions of the Python package; others have none
 
   bool has_llvm() const { return llvm.is_there && llvm.is_there(); }
 
-  /// Those that go with a program or Python package in `folder`: of its build, if the file pendula.toolchain is there,
-  /// else of its installation. The environment comes first: PENDULA_PYTHON; CC, else cc, gcc or clang; CFLAGS;
-  /// PENDULA_KERNELS_BY. The cache is $XDG_CACHE_HOME/pendula, else ~/.cache/pendula.
+  /// The toolchain of a program or Python package in `folder`: that of its build, if the file pendula.toolchain is
+  /// there, else that of its installation. The environment comes first: PENDULA_PYTHON; CC, else cc, gcc or clang;
+  /// CFLAGS; PENDULA_KERNELS_BY. The cache is $XDG_CACHE_HOME/pendula, else ~/.cache/pendula.
   static Toolchain of(const std::filesystem::path& folder);
   static Toolchain of_this_program();
 

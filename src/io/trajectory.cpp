@@ -59,8 +59,8 @@ void LineFile::flush() {
   if (written != wanted) throw OutputError(name_, error);
 }
 
-/// Writes as many of the pending lines as possible, and clears them. Returns the bytes written; errno says why they are
-/// not all.
+/// Writes as many of the pending lines as possible, and clears them. Returns the bytes written; if that is not all,
+/// errno says why.
 std::size_t LineFile::write_pending() {
   std::size_t written = 0;
   while (written < pending_.size()) {
@@ -78,7 +78,7 @@ std::size_t LineFile::write_pending() {
   return written;
 }
 
-/// Removes an incomplete line from the end of the file, if that is no pipe.
+/// Removes an incomplete line from the end of the file, unless the file is a pipe.
 void LineFile::cut_off(std::size_t bytes) const {
   if (bytes == 0 || !is_regular(descriptor_)) return;
   const off_t end = lseek(descriptor_, 0, SEEK_CUR);

@@ -30,7 +30,7 @@ std::string script_json(const nlohmann::json& value) {
 }
 
 std::string html_text(std::string_view text) {
-  // Through JSON and back, which mends what is no UTF-8.
+  // Through JSON and back, which replaces bytes that are not UTF-8.
   const std::string mended =
       nlohmann::json::parse(nlohmann::json(text).dump(-1, ' ', false, nlohmann::json::error_handler_t::replace));
   std::string html;

@@ -12,7 +12,7 @@
 
 namespace pendula::view {
 
-/// Numbers one after the other, lowest byte first: the order of every machine that a browser runs on.
+/// The bytes of consecutive numbers, lowest byte first, as on every machine that runs a browser.
 class Bytes {
  public:
   template <std::floating_point Real>
@@ -32,10 +32,10 @@ class Bytes {
 /// Appends `bytes` in base64 (RFC 4648, padded).
 void append_base64(std::string& text, std::string_view bytes);
 
-/// Text as it may stand between tags of HTML; what is no UTF-8 becomes U+FFFD.
+/// Text escaped for HTML, to stand between tags; bytes that are not UTF-8 become U+FFFD.
 std::string html_text(std::string_view text);
 
-/// JSON as it may stand in a <script>: nothing in it closes or opens a tag or a comment.
+/// JSON escaped for a <script>: nothing in it closes or opens a tag or a comment.
 std::string script_json(const nlohmann::json& value);
 
 /// A text in which {{name}} is replaced by part(name).

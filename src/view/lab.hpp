@@ -34,10 +34,10 @@ class LabLink {
   std::string text_;
 };
 
-/// What acts from outside: inputs that are held, and sines on them, four numbers each.
+/// Adds inputs: constant parts, and sines on them, four numbers each.
 void put_inputs(LabLink& link, std::span<const double> held, std::span<const InputSine> sines);
 
-/// What a chain is, without a state. Its torques are its inputs, link by link.
+/// A chain without a state. Its torques are its inputs, link by link.
 template <class Space>
 LabLink lab_link(const Chain<Space>& chain) {
   LabLink link;
@@ -58,7 +58,8 @@ LabLink lab_link(const Chain<Space>& chain) {
   return link;
 }
 
-/// What of a chain a laboratory leaves out or changes, in words; its bounds are those of src/view/lab/spec.js.
+/// Properties of a chain that a laboratory leaves out or changes, in words; the bounds are those of
+/// src/view/lab/spec.js.
 template <class Space>
 std::vector<std::string> lab_leaves_out(const Chain<Space>& chain) {
   constexpr int most_links = 300;
@@ -75,15 +76,15 @@ std::vector<std::string> lab_leaves_out(const Chain<Space>& chain) {
   return words;
 }
 
-/// What a system is, without a state: parameters and inputs. The link goes with `lab_model`.
+/// A system without a state: parameters and inputs. The link goes with `lab_model`.
 LabLink lab_link(const SystemSubject& system);
 
-/// What a laboratory begins with that moves a model by its program: "model" and "program".
+/// The start of a laboratory that moves a model by its program: "model" and "program".
 nlohmann::json lab_model(const SystemInfo& info, std::string program);
 
-/// The page of a laboratory, in which motion is computed: one HTML file that needs nothing else. `start` is what it
-/// begins with (docs/reference/laboratory.md): "title", and "state", the words of a link; of a model besides
-/// "program" and "model".
+/// The page of a laboratory, in which motion is computed: one HTML file that needs nothing else. `start`
+/// (docs/reference/laboratory.md) has "title", and "state", the words of a link; for a model "program" and "model",
+/// too.
 std::string lab_page(const nlohmann::json& start);
 
 }  // namespace pendula::view

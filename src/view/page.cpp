@@ -20,7 +20,7 @@ KeptRows::KeptRows(std::size_t width, std::size_t most) : width_(width), most_(s
 
 void KeptRows::add(std::span<const double> row) {
   if (seen_ % stride_ == 0) {
-    if (regular() + 1 >= most_) halve();  // one place is for the last row
+    if (regular() + 1 >= most_) halve();  // one place is kept for the last row
     if (seen_ % stride_ == 0) rows_.insert(rows_.end(), row.begin(), row.end());
   }
   last_.assign(row.begin(), row.end());
@@ -52,19 +52,19 @@ constexpr std::size_t most_marks = 1000;                   // of an event in a r
 constexpr double alike = 1e-6;                             // steps that differ by less are of one size
 constexpr double least_wanted = 2000, most_wanted = 4000;  // rows of runs that are not very long
 
-/// Bytes of a row in base64: the time, the numbers, and floats that tell its energy error, its distance and its step.
+/// Bytes of a row in base64: the time, the numbers, and three floats: energy error, distance and step size.
 std::size_t row_bytes(std::size_t numbers, std::size_t size) {
   return (8 + numbers * size + 12) * 4 / 3 + 1;
 }
 
-/// All but the time.
+/// All columns but the time.
 std::vector<std::size_t> all_columns(const Scene& scene) {
   std::vector<std::size_t> columns(std::max<std::size_t>(scene.columns.size(), 1) - 1);
   std::iota(columns.begin(), columns.end(), std::size_t{1});
   return columns;
 }
 
-/// Those that a drawing needs: without points where angles tell them.
+/// The columns that a drawing needs: without points where they follow from angles.
 std::vector<std::size_t> drawn_columns(const Scene& scene) {
   std::vector<std::size_t> columns;
   for (const Coordinate& coordinate : scene.coordinates) {
@@ -102,7 +102,7 @@ Page::Page(const std::string& file, Scene scene, std::size_t runs, const PageLim
       drawn_columns_(drawn_columns(scene_)),
       file_(file) {}
 
-// Times of later runs are among those of the first, to the bit: the interval is twice, four times, … as long.
+// Times of later runs are among those of the first, to the last bit: their interval is twice, four times, … as long.
 RowTimes Page::times(double duration, std::size_t run) const {
   if (duration == 0) return {1, {}};
   const auto most = [&](std::size_t k) { return static_cast<double>(most_rows(k) - 2); };  // the ends, without thinning
@@ -184,7 +184,7 @@ std::vector<float> Page::energy_errors(const Run& run) const {
   return errors;
 }
 
-// From the first run, at the rows that have their times in common: as doubles, before they become floats.
+// Distances from the first run at rows of equal times, computed from doubles.
 std::vector<float> Page::separations(const Run& run) const {
   const KeptRows& first = runs_.front().rows;
   std::vector<float> separations;
@@ -201,7 +201,7 @@ std::vector<float> Page::separations(const Run& run) const {
   return separations;
 }
 
-// Empty where they are all alike; the last one may be cut short.
+// Step sizes of the rows; empty if all are equal, except the last one, which may be cut short.
 std::vector<float> Page::steps(const Run& run) const {
   std::vector<float> steps;
   steps.reserve(run.rows.size());
@@ -217,7 +217,7 @@ std::vector<float> Page::steps(const Run& run) const {
   return steps;
 }
 
-// The largest of any point, or of any coordinate where there are none.
+// The largest distance of any point, or of any coordinate if there are no points.
 double Page::distance(std::span<const double> a, std::span<const double> b) const {
   double largest = 0;
   for (const Point& point : scene_.points) {
@@ -234,7 +234,7 @@ double Page::distance(std::span<const double> a, std::span<const double> b) cons
   return largest;
 }
 
-// Times, columns one after the other, errors of the energy, distances, sizes of steps.
+// Encodes times, columns one after the other, energy errors, distances, step sizes.
 std::string Page::encoded(const Run& run) const {
   Bytes bytes;
   const std::size_t rows = run.rows.size();
@@ -312,7 +312,7 @@ json Page::described() const {
           {"runs", runs}};
 }
 
-/// What stands for {{name}}.
+/// The text in place of {{name}}.
 std::string Page::part(const std::string& name) const {
   if (name == "title") return html_text(scene_.title);
   if (name == "version") return html_text(scene_.version);

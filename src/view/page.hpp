@@ -17,8 +17,8 @@
 
 namespace pendula::view {
 
-/// Rows of a run, thinned so that they never are more than a given number: every stride-th, stride a power of two, and
-/// always the first and the last.
+/// Rows of a run, thinned to at most a given number: every stride-th, with stride a power of two, and always the first
+/// and the last.
 class KeptRows {
  public:
   /// width    numbers of a row
@@ -31,7 +31,7 @@ class KeptRows {
   std::span<const double> operator[](std::size_t i) const;
 
   std::int64_t seen() const { return seen_; }      ///< rows that were added
-  std::int64_t stride() const { return stride_; }  ///< of those, each so-many-th is here
+  std::int64_t stride() const { return stride_; }  ///< every stride-th of these is kept
 
  private:
   std::size_t regular() const { return rows_.size() / width_; }
@@ -43,58 +43,58 @@ class KeptRows {
   std::int64_t seen_ = 0, stride_ = 1;
 };
 
-/// How large a page may become: bytes of the rows in it, as text.
+/// Limits of the size of a page: bytes of its rows, as text.
 struct PageLimits {
   std::size_t rows = 1'100'000;  ///< of all runs; the rest of a page is 75 kB, in space 320, and 900 of a laboratory
-  /// Where a row is so long that `rows` leaves less than 512 of them to a run, up to so many.
+  /// The limit instead of `rows` where rows are so long that a run would have less than 512 of them.
   std::size_t long_rows = 6'000'000;
 };
 
 /// A page to look at one run, or at several together: one HTML file that needs nothing else.
 ///
-/// Rows are thinned, evenly and in bounded memory, and the page says so. As long as 2048 of them can be kept with all
-/// their columns as doubles, they are, and the CSV that the page gives has all of their digits; longer rows, and those
-/// of the second run and later ones, are floats of what is drawn. Events are marks on the line of time, thinned in the
-/// same way; the sizes of steps are shown where the method chooses them.
+/// Rows are thinned, evenly and in bounded memory, and the page says so. The first run keeps all columns as doubles if
+/// 2048 such rows fit; then the CSV that the page offers has all digits. Otherwise, and in later runs, rows are floats
+/// of the columns that are drawn. Events are marks on the line of time, thinned in the same way; step sizes are shown
+/// if the method is adaptive.
 class Page : public Observer {
  public:
-  /// Opens the file. `runs` is how many will follow: they share the page. Throws io::InputError.
+  /// Opens the file. `runs` is the number of runs that will follow and share the page. Throws io::InputError.
   Page(const std::string& file, Scene scene, std::size_t runs = 1, const PageLimits& limits = {});
 
-  /// The times at which the page wants rows of a run of this duration, so that it moves evenly: as many as it can keep,
-  /// but no more than serve to be looked at  [s]. `run` is its number, from 0 on.
+  /// The times at which the page wants rows of a run of this duration, so that it moves evenly: as many as it can keep
+  /// and a viewer needs  [s]. `run` is the number of the run, from 0 on.
   RowTimes times(double duration, std::size_t run = 0) const;
 
-  /// What it shows.
+  /// The description of what the page shows.
   const Scene& scene() const { return scene_; }
 
-  /// Rows that follow are those of a run that the page calls `label`.
+  /// Begins a run that the page calls `label`; the rows that follow are its rows.
   void begin_run(const std::string& label);
 
-  /// Takes a row, in the order of the columns, and the size of the step that it lies in, NaN where there is none  [s].
+  /// Takes a row, in the order of the columns, and the size of the step that contains it, NaN if there is none  [s].
   void add_row(std::span<const double> row, double step = std::numeric_limits<double>::quiet_NaN());
 
   /// Takes an event of the run.
   void add_event(const std::string& name, double time, bool up);
 
-  /// The same of a run whose observer the page is.
+  /// The same for a run that has the page as its observer.
   void take(const Row& row) override;
   void happen(const EventRow& happened) override;
 
-  /// Says what the energies of the run are compared with: RunReport::energy_error, which is complete with the last row.
-  /// Without it the page has no energy errors of the run.
+  /// Ends a run. `energy` is RunReport::energy_error, which is complete with the last row. Without this call the page
+  /// has no energy errors of the run.
   void end_run(const EnergyError& energy);
 
-  /// Writes the page; does nothing, and leaves no file, where no row came. Throws io::OutputError.
+  /// Writes the page; without any row, does nothing and leaves no file. Throws io::OutputError.
   void close();
 
  private:
   struct Run {
     std::string label;
-    KeptRows rows;      // and the size of the step as the last number
+    KeptRows rows;      // with the step size as the last number
     std::size_t share;  // bytes for the rows, as text
     EnergyError energy;
-    std::map<std::string, KeptRows> events;  // by name: when, and whether from − to +
+    std::map<std::string, KeptRows> events;  // by name: time, and whether from − to +
   };
 
   std::size_t share_of(std::size_t run) const;

@@ -19,7 +19,7 @@ namespace pendula::view {
 
 namespace detail {
 
-/// What is drawn: feedback has no part in it.
+/// The scene of a scenario without its feedback, which is not drawn.
 template <class Space>
 Scene drawn_scene(const io::Scenario<Space>& scenario) {
   return scene_of(ChainSubject<Space>(scenario.chain));
@@ -30,8 +30,8 @@ inline Scene drawn_scene(const io::SystemScenario& scenario) {
 
 }  // namespace detail
 
-/// The description of a scenario's subject for a page. Its rows are those of the subject with its feedback, whose
-/// torques a chain has as further columns.
+/// The description of a scenario's subject for a page. Its rows are those of the subject with feedback, which adds
+/// columns of torques to a chain.
 template <class Scenario>
 Scene subject_scene(const Scenario& scenario) {
   Scene scene = detail::drawn_scene(scenario);
@@ -41,7 +41,8 @@ Scene subject_scene(const Scenario& scenario) {
   return scene;
 }
 
-/// What of a scenario a laboratory leaves out or changes, in words. Continuous feedback is part of a model's program.
+/// Parts of a scenario that a laboratory leaves out or changes, in words. Continuous feedback is part of a model's
+/// program.
 template <class Scenario>
 std::vector<std::string> laboratory_leaves_out(const Scenario& scenario) {
   std::vector<std::string> words;
@@ -57,7 +58,7 @@ std::vector<std::string> laboratory_leaves_out(const Scenario& scenario) {
   return words;
 }
 
-/// The laboratory's link of what is moved, in SI, if the laboratory has all of it; empty for all else.
+/// The laboratory's link of a scenario's subject, in SI; empty if the laboratory would leave something out.
 template <class Scenario>
 std::string laboratory_of(const Scenario& scenario) {
   if (!laboratory_leaves_out(scenario).empty()) return {};
@@ -68,7 +69,7 @@ std::string laboratory_of(const Scenario& scenario) {
   }
 }
 
-/// What a page is told of a run besides its rows.
+/// The description of a run for a page, besides its rows.
 template <class Scenario>
 Scene scene_of(const Scenario& scenario, const io::RunSource& source) {
   Scene scene = subject_scene(scenario);

@@ -9,23 +9,23 @@
 
 namespace pendula::view {
 
-/// One coordinate of what is moved, and where a row has it.
+/// A coordinate, and its columns in a row.
 struct Coordinate {
   std::string name, unit;
   bool is_angle = false;
   std::size_t column = 0, rate_column = 0;
 };
 
-/// One point of what is moved: its components stand in a row one after the other, from `column` on.
+/// A point. Its components are consecutive columns of a row, from `column` on.
 struct Point {
   std::string name;
   std::size_t column = 0;
   int components = 2;
-  double mass = 0;           ///< kg; 0 where it is not known
+  double mass = 0;           ///< kg; 0 if unknown
   std::string kind = "bob";  ///< what it is drawn as, a kind of SystemInfo::point_kinds
 };
 
-/// What acts on it from outside, and where a row has it.
+/// An input, and its column in a row.
 struct ActingInput {
   std::string name, unit;
   std::size_t column = 0;
@@ -37,16 +37,16 @@ struct Connection {
   int from = -1, to = -1;
 };
 
-/// What joins the points.
+/// Which points are joined by rods.
 enum class Rods {
   none,
-  in_order,  ///< the origin with the first, each with the next
-  rigid,     ///< the same, but only those whose distance stays what it is during the run: seen by the page
+  in_order,  ///< the origin and the first, each and the next
+  rigid,     ///< of these, pairs whose distance is constant during the run: the page finds them
 };
 
-/// What a page is told besides the rows: what moves, and how it may be drawn.
+/// The description of a run for a page, besides its rows: what moves, and how it is drawn.
 struct Scene {
-  std::string title;     ///< of the page: a scenario's name, say
+  std::string title;     ///< of the page, such as a scenario's name
   std::string subject;   ///< one line, "4 links in space"
   std::string scenario;  ///< its text, to copy from the page
   std::string version;   ///< of pendula
@@ -56,25 +56,25 @@ struct Scene {
   std::vector<Point> points;
   std::vector<Connection> connections;
   Rods rods = Rods::none;
-  std::vector<double> lengths;  ///< of a chain's rods [m]: its points need not be stored, its angles tell them
-  bool loaded = false;          ///< whether energy may come from outside, or go there
+  std::vector<double> lengths;  ///< of a chain's rods [m]: points follow from angles, and need not be stored
+  bool loaded = false;          ///< whether loads may change the energy
   std::string time_unit = "s", length_unit = "m";
   std::string laboratory;        ///< the link of a laboratory to go on in, without a state; empty: the page offers none
-  std::string laboratory_model;  ///< JSON, what the laboratory begins with of a model (lab_model); empty of a chain
+  std::string laboratory_model;  ///< JSON of a model for the laboratory (lab_model); empty for a chain
 
-  /// Of the space that the points are in: 2 or 3, 0 without points.
+  /// Dimension of the space of the points: 2 or 3, 0 without points.
   int dimension() const;
 };
 
 namespace detail {
 
-/// A chain from plain numbers; `dof` angles a link.
+/// The scene of a chain from plain numbers; `dof` angles a link.
 Scene chain_scene(std::vector<std::string> columns, std::size_t dof, const Eigen::VectorXd& masses,
                   const Eigen::VectorXd& lengths);
 
 }  // namespace detail
 
-/// What a chain is; title, scenario and version are the caller's.
+/// The scene of a chain. The caller sets title, scenario and version.
 template <class Space>
 Scene scene_of(const ChainSubject<Space>& subject) {
   const Chain<Space>& chain = subject.chain();
@@ -89,11 +89,11 @@ std::string point_kind(const SystemInfo& info, std::size_t k);
 /// What is drawn between the points of a system.
 std::vector<Connection> connections_of(const SystemInfo& info);
 
-/// What points are drawn as, and what is between them, for pictures that are made from a file: JSON, {"kinds": ["cart",
-/// …], "connections": [["spring", 0, 1], …]}. Empty of a chain.
+/// What points are drawn as, and what is between them, for pictures made from a file: JSON, {"kinds": ["cart", …],
+/// "connections": [["spring", 0, 1], …]}. Empty for a chain.
 std::string drawing_of(const Scene& scene);
 
-/// The same of any other system, whose rods are what stays rigid.
+/// The scene of any other system; its rods are Rods::rigid.
 Scene scene_of(const SystemSubject& subject);
 
 }  // namespace pendula::view

@@ -1,7 +1,7 @@
 """Kernels as bytecode: steps on numbered registers, a line each, for the interpreter of the runtime.
 
-Of a function, lines say in this order: what it is called and how many registers it takes; what is read, and which
-numbers there are, before it begins; its operations, their results first; and what it gives. Between words are tabs.
+The lines of a function have, in this order: its name and its number of registers; the rows to read and the constants
+to load before it begins; its operations, with their results first; and the rows that it gives. Tabs separate words.
 """
 
 from __future__ import annotations
@@ -49,13 +49,13 @@ def _words(step: Step, register: dict[Value, int]) -> tuple[object, ...]:
 
 
 def _has_zeros(tape: Tape) -> bool:
-    """Whether linear systems are shorter in products and sums, without what is known to be 0."""
+    """Whether linear systems have entries known to be 0: written as products and sums they are shorter then."""
     zeros = {step.first for step in tape.steps if step.operation == "number" and step.number == 0}
     return any(step.operation == "factor" and not zeros.isdisjoint(step.operands) for step in tape.steps)
 
 
 def _fused(tape: Tape) -> Tape:
-    """The same tape with products in the sums that alone need them, and exponents as values."""
+    """The same tape with products fused into sums that are their only use, and exponents as values."""
     uses = Counter(value for step in tape.steps for value in step.operands)
     uses.update(tape.outputs.values())
     products = {
@@ -67,7 +67,7 @@ def _fused(tape: Tape) -> Tape:
     place: dict[Value, Value] = {}
 
     def product_of(step: Step) -> Value | None:
-        """The product that goes into a sum; that which comes last, of two."""
+        """The product that is fused into a sum; of two, the later one."""
         if step.operation not in ("add", "subtract"):
             return None
         return max((value for value in step.operands if value in products), default=None)
@@ -92,7 +92,7 @@ def _fused(tape: Tape) -> Tape:
 
 
 def _grouped(steps: list[Step]) -> list[Step]:
-    """The same steps, those of a kind one after the other where they can be: the interpreter looks at kinds of runs."""
+    """The same steps, with those of one kind in runs where possible: the interpreter decodes one kind for each run."""
     maker = {value: k for k, step in enumerate(steps) for value in step.results}
     needs = [{maker[value] for value in step.operands if value in maker} for step in steps]
     users: list[list[int]] = [[] for _ in steps]
@@ -118,10 +118,10 @@ def _grouped(steps: list[Step]) -> list[Step]:
 
 
 class _Registers:
-    """Which register has each value: one that no later step needs is taken again.
+    """Assigns registers to values. A register whose value no later step needs is used again.
 
-    of      of a value
-    count   how many there are
+    of      the register of each value
+    count   number of registers
     """
 
     def __init__(self, steps: list[Step], kept: set[Value]):
@@ -131,7 +131,7 @@ class _Registers:
         last = {value: step for step in steps for value in step.operands}
         for step in steps:
             over = {value for value in step.operands if last[value] is step} - kept
-            # Linear systems are read bit by bit while they are solved: they have registers of their own, in a row.
+            # Linear systems are read while they are solved: their results have consecutive registers of their own.
             if step.operation in ("factor", "solve"):
                 self._take(step.results)
                 self._release(over)
@@ -145,13 +145,13 @@ class _Registers:
         self._free.update(self.of[value] for value in values)
 
     def _take(self, values: Sequence[Value]) -> None:
-        """Registers in a row."""
+        """Assigns consecutive registers."""
         first = self._first_of(len(values))
         self.of |= {value: first + k for k, value in enumerate(values)}
         self._free -= {self.of[value] for value in values}
         self.count = max(self.count, first + len(values))
 
     def _first_of(self, count: int) -> int:
-        """The first of so many registers in a row."""
+        """The first of `count` consecutive free registers."""
         free = {*self._free, *range(self.count, self.count + count)}
         return next(k for k in sorted(free) if all(k + j in free for j in range(count)))

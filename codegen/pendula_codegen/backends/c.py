@@ -11,9 +11,9 @@ from pendula_codegen.table import CONDITIONS, KernelTable, TableFunction
 from pendula_codegen.tape import Row, Step, Tape, Value
 
 INTERFACE = 15  # system_interface of pendula/system/system_table.hpp
-# Functions of one argument that are taken of numbers one by one.
+# Functions of one argument that are called for one number at a time.
 CALLS = {"acos", "asin", "atan", "cbrt", "cosh", "sinh", "sqrt", "tan", "tanh"}
-# What of so many states nothing asks for within steps: it is compiled for eight, and others go that way.
+# Functions that steps do not call for these numbers of states: they are compiled for eight only, and others use those.
 SELDOM = {
     **dict.fromkeys(
         ("acceleration_along", "momentum_form_along", "series_start_along", "series_next_along"), (1, 2, 4)
@@ -30,7 +30,7 @@ class CFunction:
 
 
 def print_functions(table: KernelTable) -> list[CFunction | None]:
-    """The text of those of many states."""
+    """The text of the functions of many states."""
     return [
         function and CFunction(function.name, "\n".join(_of_any_width(table, function, place)))
         for place, function in enumerate(table.of_many)
@@ -70,7 +70,7 @@ def _head(function: TableFunction, read: Set[str]) -> str:
 
 
 def _by_eight(table: KernelTable, function: TableFunction, place: int) -> list[str]:
-    """A function of few states by that of eight, some of them more than once."""
+    """A function of few states that calls that of eight, with some states repeated."""
     taken = {f"at->{array}": table.rows[array] for array in CONDITIONS}
     taken |= {array: table.rows[array] for array in function.takes}
     given = {array: [name for name, _ in function.tape.outputs].count(array) for array in function.gives}
@@ -94,17 +94,17 @@ def _by_eight(table: KernelTable, function: TableFunction, place: int) -> list[s
 
 
 def quoted(text: str) -> str:
-    """A line as a string."""
+    """A line as a C string literal, with a newline."""
     for special, written in (("\\", "\\\\"), ('"', '\\"'), ("\t", "\\t"), ("?", "\\?")):
         text = text.replace(special, written)
     return f'"{text}\\n"'
 
 
 class Statements:
-    """The steps of a tape as statements, a number each.
+    """The steps of a tape as statements, one for each number.
 
     number   the type of numbers
-    names    what people call what is read
+    names    the model's names of rows that are read
     """
 
     def __init__(self, number: str, names: Mapping[Row, str]):
@@ -118,20 +118,20 @@ class Statements:
         return [line for step in tape.steps for line in self._step(step)]
 
     def value(self, value: Value) -> str:
-        """What a step gave."""
+        """The text of a step's result."""
         return self._operand(value)
 
-    # --- how these are written
+    # --- what subclasses write differently
 
     def literal(self, value: float) -> str:
         return repr(value)
 
     def function(self, name: str) -> str:
-        """Of the mathematical library."""
+        """The name of a function of the mathematical library."""
         return name
 
     def _solver(self, operation: str) -> str:
-        """Of a linear system that is too large to be written out."""
+        """The name of a function for a linear system that is too large to be written out."""
         return self.function(operation)
 
     def _read(self, step: Step) -> list[str]:
@@ -183,11 +183,11 @@ class Statements:
         return f"{self.function(step.operation)}({first}{more})"
 
     def _operand(self, value: Value) -> str:
-        """Of an operation that takes a number, too, where it takes several at once."""
+        """An operand of an operation that also takes a plain number where others are packs."""
         return self._names.get(value) or self.literal(self._numbers[value])
 
     def _name_of(self, row: Row) -> str:
-        """What is the model's ends in an underscore, and nothing else does."""
+        """The name of a row. Names of the model get an underscore at the end, and no others do."""
         if row not in self._called:
             return "_".join(map(str, row))
         name = f"{self._called[row]}_"
@@ -200,8 +200,8 @@ class Statements:
 class Printer(Statements):
     """Statements of as many numbers as a register has.
 
-    variables   what is read, and has a name already
-    conditions  arrays that stand in Conditions
+    variables   rows that have a variable already
+    conditions  arrays that are members of Conditions
     """
 
     def __init__(

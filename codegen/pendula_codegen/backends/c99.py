@@ -28,7 +28,7 @@ class C99Printer(Statements):
         return function._lines(tape.written_out(UNROLLED))
 
     def read_by(self, tape: Tape) -> set[str]:
-        """Arrays that its body reads: writing it out may leave nothing of what it took from one."""
+        """The arrays that the body of a tape reads; once linear systems are written out, that may be fewer."""
         written = tape.written_out(UNROLLED)
         used = _used_by(written)
         return {step.row[0] for step in written.steps if step.operation == "read" and step.first in used}

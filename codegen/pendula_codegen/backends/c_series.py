@@ -1,4 +1,4 @@
-"""Taylor series in C: the text of what templates/series.c.j2 leaves open."""
+"""Taylor series in C: the text that fills templates/series.c.j2."""
 
 from __future__ import annotations
 
@@ -10,19 +10,19 @@ from pendula_codegen.linear_solve import UNROLLED
 from pendula_codegen.series_tape import SeriesTapes
 from pendula_codegen.tape import Row
 
-# Of one motion, up to how many sums the newest coefficients are added one by one; beyond, their rows are made in
+# Up to so many sums of one motion the newest coefficients are added one by one; with more, their rows are made in
 # registers.
 NEWEST_ADDED = 16
-AT_A_TIME = 30  # registers that sums of many motions take together, which are made in one loop
+AT_A_TIME = 30  # most registers for the sums of many motions that one loop computes
 
 
 @dataclass(frozen=True)
 class CSeries:
-    """What a kernel's text says of its series: numbers, and lines of C.
+    """The parts of a kernel's text for its series: numbers, and lines of C.
 
-    padded_state   numbers of a row of one motion's state
+    padded_state   numbers in a row of one motion's state
     padded_sums    lanes of one motion's sums
-    before, after  what an order reads of the state: before the first one, and by each for the next
+    before, after  statements that set the state that an order reads: before the first order, and after each
     """
 
     form: str
@@ -74,7 +74,7 @@ def print_series(tapes: SeriesTapes, names: Mapping[Row, str]) -> CSeries:
 
 
 def padded_state(size: int) -> int:
-    """Numbers of a row that a motion's state takes, so that registers can sum many of them."""
+    """Numbers in a row of a motion's state, padded so that registers can sum several."""
     return 4 if 2 * size <= 4 else lanes_of(2 * size)
 
 
@@ -83,7 +83,7 @@ def lanes_of(count: int) -> int:
 
 
 def _sums_of_many(places: list[tuple[int, int]]) -> list[str]:
-    """Some together, whose operands are read once."""
+    """Statements for the sums of many motions. Sums that share operands are in one loop, which reads these once."""
     lines = [f"V {', '.join(f'sum_{k} = SPLAT(0.0)' for k in range(len(places)))};"]
     for group in groups_of(places):
         operands = sorted({operand for k in group for operand in places[k]})
@@ -111,7 +111,7 @@ def _sums_of_many(places: list[tuple[int, int]]) -> list[str]:
 
 
 def groups_of(places: list[tuple[int, int]]) -> list[list[int]]:
-    """Sums that share operands, as many as registers hold with them."""
+    """Groups of sums that share operands, as many as registers hold with these."""
     waiting, groups = [*range(len(places))], []
     while waiting:
         group, held = [], set()
@@ -131,7 +131,7 @@ def groups_of(places: list[tuple[int, int]]) -> list[list[int]]:
 
 
 class _One:
-    """Of one motion: rows have the first operands of all sums, then the second ones."""
+    """Statements for one motion: rows have the first operands of all sums, then the second ones."""
 
     def __init__(self, places: list[tuple[int, int]], operands: list[str]):
         self._places = places

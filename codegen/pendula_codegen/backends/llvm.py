@@ -1,6 +1,6 @@
 """Kernels as LLVM's text: the steps of tapes for 1, 2, 4 and 8 states, in registers as wide as a processor has them.
 
-What stands in the table of a kernel is as in C (templates/kernel.c.j2), and so is the order of operations.
+The table of a kernel and the order of operations are the same as in C (templates/kernel.c.j2).
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from pendula_codegen.table import CONDITIONS, KernelTable, TableFunction
 
 WIDTHS = (1, 2, 4, 8)
 _AVX2 = "+avx2,+fma"
-# Of the instruction sets of the library: the numbers that a register has, and what LLVM calls the instructions.
+# For each instruction set of the library: numbers in a register, and LLVM's names of the instructions.
 INSTRUCTION_SETS = {
     "baseline": (2, ""),
     "sse2": (2, "-sse3"),
@@ -30,7 +30,7 @@ INSTRUCTION_SETS = {
 
 
 def print_kernel(table: KernelTable, size: int, description: Sequence[str], instruction_set: str) -> str:
-    """The kernel of a model with so many coordinates, whose description is in lines."""
+    """The kernel of a model with `size` coordinates; `description` has the lines of its description."""
     most, features = INSTRUCTION_SETS[instruction_set]
     used = table.operations()
     of_many, plain = ([_written_out(one) for one in functions] for functions in (table.of_many, table.plain))
@@ -89,7 +89,7 @@ def _head(function: TableFunction, states: int) -> str:
 
 
 def _by_eight(table: KernelTable, function: TableFunction, states: int) -> str:
-    """A function of few states by that of eight, some of them more than once."""
+    """A function of few states that calls that of eight, with some states repeated."""
     f = LlvmFunction(_head(function, states), 1)
     taken = [table.rows[array] for array in (*CONDITIONS, *function.takes)]
     given = [[name for name, _ in function.tape.outputs].count(array) for array in function.gives]

@@ -1,4 +1,4 @@
-"""Functions that kernels call, as LLVM's text: what templates/sincos.c.j2, exp.c.j2 and log.c.j2 are in C."""
+"""Functions that kernels call, as LLVM's text: the same as templates/sincos.c.j2, exp.c.j2 and log.c.j2 in C."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ def library_declarations() -> list[str]:
 
 
 def call_of(function: LlvmFunction, operation: str, x: str, exponent: float) -> str:
-    """What an operation of a tape gives that is a function of one argument, or a power."""
+    """The result of an operation of a tape that is a function of one argument, or a power."""
     kind, width = function.numbers, function.width
     if operation == "sqrt":
         return function.intrinsic("sqrt", x)
@@ -29,7 +29,7 @@ def call_of(function: LlvmFunction, operation: str, x: str, exponent: float) -> 
 
 
 def functions_of(width: int, used: set[str]) -> list[str]:
-    """Those of so many numbers that these operations take."""
+    """The functions of `width` numbers that these operations call."""
     made = {"sincos": _sincos, "exp": _exp, "log": _log}
     own = [text for name, make in made.items() if name in used for text in make(width)]
     called = sorted(used & CALLS - {"sqrt"} | used & {"pow"})
@@ -54,7 +54,7 @@ def _by_lane(name: str, width: int) -> str:
 
 
 def _by_library(function: LlvmFunction, name: str, x: str, where: str, found: str) -> str:
-    """The standard library's values where a condition holds, elsewhere those that were found."""
+    """The standard library's values where a condition holds, elsewhere `found`."""
     others = [function.let(f"call double @{name}(double {lane})") for lane in function.lanes(x)]
     return function.choose(where, function.together(others), found)
 
@@ -123,7 +123,7 @@ def _sincos(width: int) -> list[str]:
 
 
 def _otherwise(f: LlvmFunction, condition: str, kind: str, found: str, other: Callable[[], str]) -> None:
-    """Returns what was found where the condition holds."""
+    """Returns `found` where the condition holds, else the result of other()."""
     f.line(f"br i1 {condition}, label %usual, label %rare")
     f.label("%rare")
     f.line(f"ret {kind} {other()}")

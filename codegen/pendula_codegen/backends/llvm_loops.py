@@ -1,4 +1,4 @@
-"""Functions of kernels that loop, as LLVM's text: what templates/iterate.c.j2, solve.c.j2 and kernel.c.j2 have in C."""
+"""Functions of kernels that loop, as LLVM's text: the same as templates/iterate.c.j2, solve.c.j2, kernel.c.j2 in C."""
 
 from __future__ import annotations
 
@@ -7,12 +7,12 @@ from collections.abc import Callable, Sequence
 
 from pendula_codegen.backends.llvm_text import LlvmFunction, literal
 
-# What a stage's coordinates and momenta give: velocities and forces, of the register that begins at some state.
+# Computes velocities and forces of a stage from coordinates and momenta, of the register that begins at some state.
 Form = Callable[[LlvmFunction, int | str, list[str]], list[str]]
 
 
 def iteration(f: LlvmFunction, states: int, size: int, form: Form) -> str:
-    """One fixed-point iteration on the stages of a step, of a model with so many coordinates."""
+    """One fixed-point iteration on the stages of a step, of a model with `size` coordinates."""
     m, hb, start, weights, increments = (f.pointer("%on", k) for k in range(5))
     before = [
         [f.read_one(f.place(increments, k * states + j)) for j in range(states)] for k in range(2 * size)
@@ -41,7 +41,7 @@ def iteration(f: LlvmFunction, states: int, size: int, form: Form) -> str:
 
 
 def _reached(f: LlvmFunction, columns: Sequence[str], start: str, increments: Sequence[str]) -> str:
-    """Where stages are by their increments, in two strands, so that few products wait for one another."""
+    """The stages from their increments, in two partial sums, so that few products wait for one another."""
     strands = [f.splat(f.read_one(f.place(start, 1))), ""]
     for j, (column, x) in enumerate(zip(columns, increments, strict=True)):
         product = f.multiply(column, f.splat(x))
@@ -56,7 +56,7 @@ def _larger(f: LlvmFunction, most: str, one: str) -> str:
 
 
 def _give_change(f: LlvmFunction, largest: str, scale: str, total: str) -> None:
-    """NaN if any change is no number: that reaches their sum, though not always the largest."""
+    """Returns the change and the scale. The change is NaN if any is: a NaN reaches the sum, not always the maximum."""
     change, size, sum_ = map(f.lanes, (largest, scale, total))
 
     def folded(lanes: list[str], how: str) -> str:
@@ -76,7 +76,7 @@ def _give_change(f: LlvmFunction, largest: str, scale: str, total: str) -> None:
 
 
 def factorization(width: int, size: int) -> str:
-    """L and 1/D of a symmetric matrix L D Lᵀ take the place of its lower triangle, row by row."""
+    """Replaces the lower triangle of a symmetric matrix L D Lᵀ, row by row, by L and 1/D."""
     f = LlvmFunction(f"internal fastcc void @factor.{width}(ptr %a)", width)
     with f.each(0, size) as k:
         pivots = _row(f, k)
@@ -97,7 +97,7 @@ def factorization(width: int, size: int) -> str:
 
 
 def solution(width: int, size: int) -> str:
-    """The solution takes the place of the right-hand side."""
+    """Replaces the right-hand side by the solution."""
     f = LlvmFunction(f"internal fastcc void @solve.{width}(ptr %a, ptr %x)", width)
 
     def subtract(i: str, k: str, row: str, column: str) -> None:
@@ -119,7 +119,7 @@ def solution(width: int, size: int) -> str:
 
 
 def _row(f: LlvmFunction, k: str) -> str:
-    """Where a row of a lower triangle begins."""
+    """The index of the first entry of a row of a lower triangle."""
     return f.let(f"lshr i64 {f.whole('mul', k, f.whole('add', k, 1))}, 1")
 
 
@@ -128,7 +128,7 @@ def _entry(f: LlvmFunction, array: str, k: str) -> str:
 
 
 def rows_of_eight(states: int) -> list[str]:
-    """Rows of fewer numbers as rows of eight, in which they come again, and back."""
+    """Functions that widen rows of fewer numbers to eight, by repetition, and narrow them again."""
     found = []
     for name, given, wanted in (("widen", states, 8), ("narrow", 8, states)):
         f = LlvmFunction(f"internal fastcc void @{name}_{states}(ptr %from, i64 %rows, ptr %to)", 1)

@@ -1,4 +1,4 @@
-"""Text of LLVM's functions: values get names as they are made; counters of loops have slots, which become registers."""
+"""Text of LLVM's functions. Each value gets a name; counters of loops have stack slots, which LLVM makes registers."""
 
 from __future__ import annotations
 
@@ -8,22 +8,22 @@ from contextlib import contextmanager
 from copy import copy
 from itertools import count
 
-ROUNDED = {"fadd", "fsub", "fmul"}  # products go into sums unrounded, where the processor has that
+ROUNDED = {"fadd", "fsub", "fmul"}  # may be fused: products then go into sums unrounded
 Pair = tuple[str, str]
 
 
 def literal(number: float) -> str:
-    """All its bits."""
+    """A number as LLVM's hexadecimal literal, with all its bits."""
     return f"0x{struct.unpack('>Q', struct.pack('>d', number))[0]:016X}"
 
 
 class LlvmFunction:
-    """A function, line by line, of registers with so many numbers.
+    """A function, line by line, on registers of `width` numbers.
 
     numbers    the type of such a register
-    integers   of one with as many integers
-    bits       of one with as many bits
-    pairs      of two registers of numbers
+    integers   the type of a register of as many integers
+    bits       the type of as many bits
+    pairs      the type of two registers of numbers
     """
 
     def __init__(self, head: str, width: int, attributes: str = "#0"):
@@ -109,13 +109,13 @@ class LlvmFunction:
         return self.let(f"call {self.numbers} @llvm.{name}.{suffix}({self.numbers} {x})")
 
     def all(self, bits: str) -> str:
-        """Whether all are set."""
+        """Whether all bits are set."""
         if self.width == 1:
             return bits
         return self.let(f"call i1 @llvm.vector.reduce.and.v{self.width}i1({self.bits} {bits})")
 
     def pair(self, x: str, y: str, type_: str = "") -> str:
-        """Two at once, of registers if nothing else is said."""
+        """A pair of two values, by default of registers of numbers."""
         of = type_ or self.numbers
         first = self.let(f"insertvalue {{ {of}, {of} }} poison, {of} {x}, 0")
         return self.let(f"insertvalue {{ {of}, {of} }} {first}, {of} {y}, 1")
@@ -150,13 +150,13 @@ class LlvmFunction:
     # --- memory
 
     def slot(self, type_: str, count: int = 1) -> str:
-        """Memory that the function has for itself."""
+        """Memory on the stack of the function."""
         name = self.name()
         self._slots.append(f"  {name} = alloca {type_}, i64 {count}, align 64")
         return name
 
     def place(self, array: str, k: int | str) -> str:
-        """Where number k of an array is."""
+        """The address of number k of an array."""
         return array if k == 0 else self.let(f"getelementptr inbounds double, ptr {array}, i64 {k}")
 
     def read(self, place: str) -> str:
@@ -169,7 +169,7 @@ class LlvmFunction:
         return self.let(f"load double, ptr {place}, align 8")
 
     def pointer(self, place: str, k: int) -> str:
-        """Pointer k of a structure that has nothing before it but such."""
+        """Loads pointer k of a structure with only pointers before it."""
         there = place if k == 0 else self.let(f"getelementptr inbounds ptr, ptr {place}, i64 {k}")
         return self.let(f"load ptr, ptr {there}, align 8")
 
@@ -197,7 +197,7 @@ class LlvmFunction:
 
     @contextmanager
     def each_register(self, states: int) -> Iterator[int | str]:
-        """A loop where one register does not have all states; at which of them a register begins."""
+        """A loop over registers; yields the first state of each. No loop if one register holds all states."""
         if states == self.width:
             yield 0
         else:
@@ -214,5 +214,5 @@ class LlvmFunction:
         self.label(done)
 
     def whole(self, operation: str, x: int | str, y: int | str) -> str:
-        """Of counters."""
+        """An operation on counters."""
         return self.let(f"{operation} nsw i64 {x}, {y}")

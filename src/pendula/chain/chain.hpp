@@ -20,7 +20,7 @@ struct Drive {
   double phase = 0;                                              ///< rad
 };
 
-/// What a chain is made of; `Chain` checks it.
+/// The parameters of a chain; `Chain` checks them.
 template <class Space, int N = Eigen::Dynamic>
 struct ChainParameters {
   LinkVector<N> masses;   ///< bobs, (n)  kg
@@ -38,12 +38,12 @@ struct ChainParameters {
 
 /// A chain of pendulums: immutable, and valid once built.
 ///
-/// N is the number of links where it is known at compile time, as in Eigen; otherwise the parameters tell it.
+/// N is the number of links where it is known at compile time; with Eigen::Dynamic it follows from the parameters.
 template <class Space, int N = Eigen::Dynamic>
 class Chain {
  public:
-  /// Throws std::invalid_argument, naming the parameter and link, on sizes that differ, masses or lengths that are not
-  /// positive, negative damping, drives on links that do not exist, and anything that is not finite.
+  /// Throws std::invalid_argument, naming the parameter and link, for sizes that differ, masses or lengths that are not
+  /// positive, negative damping, drives on links that do not exist, and numbers that are not finite.
   explicit Chain(ChainParameters<Space, N> parameters) : parameters_(fill(std::move(parameters))) {
     validate();
     mass_below_.resize(links());

@@ -9,15 +9,15 @@
 
 namespace pendula {
 
-/// The angles of a chain's links along a run that moves rods: full turns, and through which side of a pole, only the
-/// motion tells.
+/// The angles of a chain's links along a run that moves rods. Full turns, and the side on which a link passes a pole,
+/// follow from the motion only.
 template <class Space>
 class ChainAngles {
   using Anchor = AngleAnchor<Space>;
   static constexpr auto dof = static_cast<std::size_t>(Space::dof);
 
  public:
-  /// Of rods of these lengths.
+  /// For rods of these lengths.
   template <class Lengths>
   explicit ChainAngles(const Lengths& lengths)
       : links_(static_cast<std::size_t>(lengths.size())),
@@ -25,7 +25,7 @@ class ChainAngles {
         now_(links_),
         before_(now_) {}
 
-  /// Of rods ξ_i = along(i) that are at angles q.
+  /// Starts with rods ξ_i = along(i) at angles q.
   template <class Along>
   void start(const double* q, Along along) {
     for (std::size_t i = 0; i < links_; ++i) {
@@ -36,8 +36,8 @@ class ChainAngles {
     before_ = now_;
   }
 
-  /// A step was taken, by which links have turned less than half a turn; rods were at ξ_i = along(i, share) when a
-  /// share of it was done.
+  /// Call after a step in which no link has turned by half a turn or more. Rods were at ξ_i = along(i, share) when
+  /// `share` of the step was done.
   template <class Along>
   void follow(Along along) {
     now_.swap(before_);
@@ -53,7 +53,7 @@ class ChainAngles {
     write(at(i), now_[at(i)].angles(), rod, rate, q, v);
   }
 
-  /// The same when a share of the last step was done; along: as above.
+  /// The same when `share` of the last step was done; `along` as for follow.
   template <class Along, class Vector>
   void read_within(int i, double share, Along along, const Vector& rod, const Vector& rate, double* q,
                    double* v) const {
@@ -62,7 +62,7 @@ class ChainAngles {
     write(at(i), followed.angles(), rod, rate, q, v);
   }
 
-  /// Of any ξ and ξ̇ of link i, at angles near to those in q, which are replaced.
+  /// The same for any ξ and ξ̇ of link i. q holds angles near it, and is replaced.
   template <class Vector>
   void read_near(int i, const Vector& rod, const Vector& rate, double* q, double* v) const {
     std::array<double, dof> near;
@@ -79,7 +79,7 @@ class ChainAngles {
   static std::size_t at(int i) { return static_cast<std::size_t>(i); }
   std::size_t entry(std::size_t i, std::size_t a) const { return a * links_ + i; }
 
-  // From where the last step began, when a share of it was done.
+  // Takes the anchor from the start of the last step to where `share` of it was done.
   template <class Along>
   void follow(int i, double share, Along along, Anchor& anchor) const {
     const auto there = along(i, share);
@@ -125,7 +125,7 @@ class ChainAngles {
 
   std::size_t links_;
   std::vector<double> lengths_;
-  std::vector<Anchor> now_, before_;  // before_: where the last step began
+  std::vector<Anchor> now_, before_;  // before_: at the start of the last step
 };
 
 }  // namespace pendula

@@ -18,9 +18,9 @@ namespace pendula {
 ///   E[k,j] = δ + H_kj V(k)·X̂(j),  E₂[k,j] = δ − H_kj X̂(k)·V(j)           (s x s, the identity at h = 0)
 ///   W_b[k,j] = H_kj V(k)·t_b(j),  F_b[k,j] = H_kj t_b(k)·V(j)
 ///   Z = T − X̂ E⁻¹ W,  v₀ = −X̂ E⁻¹ slip                                   changes of V that keep X·V but for −slip
-///   L = Tᵀ + F E₂⁻¹ X̂ᵀ                                                    what of q no multiplier changes
+///   L = Tᵀ + F E₂⁻¹ X̂ᵀ                                                    the part of q that no multiplier changes
 ///   N = τ H − H τ − (λ/l²) H + H (torque/l² ×) H − (M |g|/l) H²             ∂q/∂V at fixed τ and G
-/// where the last term is that of steps which do not resolve the chain's swinging.
+/// where the last term is zero, except in steps that do not resolve the chain's swinging.
 template <class Space, int S, int N = Eigen::Dynamic, class Real = double, class Arch = xsimd::default_arch>
 class ChainElimination {
  protected:
@@ -75,7 +75,7 @@ class ChainElimination {
     }
   }
 
-  // X, V, X̂ and the tangents of link i with its rod at X; gives X·V.
+  // Sets X, V, X̂ and the tangents of link i with its rod at X. Returns X·V.
   L set_directions(const Stages& stages, int i, const Vector& X, Terms& terms) const {
     const Vector U = stages.increments(i);
     const Real* free = stages.rods().free(i);
@@ -108,7 +108,7 @@ class ChainElimination {
     positive_ = detail::solve_negated(E2, terms.inverse) && positive_;
   }
 
-  // Z = T − X̂ E⁻¹ W, and behind it v₀ = −X̂ E⁻¹ slip, a column for each slip: how far X·V is off at the stages.
+  // Z = T − X̂ E⁻¹ W, and after it v₀ = −X̂ E⁻¹ slip, a column for each slip: the error of X·V at the stages.
   template <std::size_t Slips>
   void find_null_space(const Terms& terms, const PerStage (&slips)[Slips], Block<vectors, unknowns + Slips>& Z) {
     Block<s, s> E;
@@ -198,8 +198,8 @@ class ChainElimination {
     }
   }
 
-  // The stages of a pack in a row from a column on: whole where there is room for what stands behind the last stage,
-  // which the columns after overwrite.
+  // Writes the stages of a pack into a row, from a column on: the whole pack where there is room, since columns that
+  // are written later overwrite the lanes behind the last stage.
   template <class B>
   static void set_stages(B& block, std::size_t row, std::size_t column, const L& lanes) {
     if (Lanes == s || column + Lanes <= B::stride) {
@@ -216,12 +216,13 @@ class ChainElimination {
   }
 
   PerStage ha_[s]{}, ha_squared_[s]{}, unit_[s]{};  // of k: h a_kj, Σ_i h a_ki h a_ij, δ_kj
-  PerStage inverse_hb_{};                           // 1/(h b), of a step of no length zero
-  Real h_{0};                                       // that all of them are for
+  PerStage inverse_hb_{};                           // 1/(h b); 0 in a step of length zero
+  Real h_{0};                                       // the step size that all of these are for
   bool is_set_ = false, positive_ = true;
 
  private:
-  // Across X in the plane of an axis a and each other one, X_a the largest component: independent everywhere.
+  // Sets tangents across X, each in the plane of the axis a with the largest |X_a| and another axis: so they are
+  // linearly independent everywhere.
   static void set_tangents(Terms& terms) {
     if constexpr (D == 2) {
       terms.tangent[0][0] = -terms.rod[1].lanes();

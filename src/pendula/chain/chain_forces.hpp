@@ -12,15 +12,14 @@
 
 namespace pendula {
 
-/// The rods of a chain and their stages in a Gauss step, with what acts on them at the stages besides multipliers and
-/// gravity; of one motion (StagesInLanes) or of several members (MembersInLanes).
+/// The rods of a chain and their stages in a Gauss step, with the forces at the stages besides multipliers and gravity:
+/// damping and torques; of one motion (StagesInLanes) or of several members (MembersInLanes).
 ///
 /// Damping and torque join τ_i ξ̇_i of the field (ChainMotion) as (λ_i ξ̇_i − torque_i × ξ_i)/l_i².
 ///
-/// Multipliers grow through a step as tension does, and where they grow too far the stage equations fold: with two
-/// stages at h ω = √12, where ω is what the chain swings with. In a step so long, M |g|/l ξ joins τ ξ̇, too: that is the
-/// term Σ M |g|/l (|ξ|² − l²)/2 of H, which is zero on the motion, and of a chain at rest nothing is left for τ. Then
-/// any swinging goes through any step, as it does in angles.
+/// In a long step the stage equations of hanging rods have a fold, with two stages at h ω = √12, if the chain swings
+/// with ω. So in a step that does not resolve ω, M |g|/l ξ joins τ ξ̇: it comes from a term Σ M |g|/l (|ξ|² − l²)/2 of
+/// H, which is zero on the motion. The τ of a chain at rest is then zero, and steps may be as long as in angles.
 template <class SpaceType, class LayoutType, int N>
 class ChainForces {
  public:
@@ -84,7 +83,7 @@ class ChainForces {
     torques_ = detail::PerLink<Torques, N>(links());
   }
 
-  /// What pulls a rod at a cell besides its multiplier, times h b.
+  /// The force on a rod at a cell besides its multiplier's, times h b.
   template <class Weight>
   [[gnu::always_inline]] std::array<Cell, D> more_pull(int i, int j, const Weight& hb, const std::array<Cell, D>& rod,
                                                        const std::array<Cell, D>& advance) const {
@@ -99,7 +98,7 @@ class ChainForces {
     return pull;
   }
 
-  /// The same at all stages, which are placed.
+  /// The same at all stages, whose rods are placed.
   std::array<Row, D> more_pull(int i) const {
     std::array<Row, D> pull;
     each_cell([&](auto j) PENDULA_WRITTEN_OUT {
@@ -109,7 +108,7 @@ class ChainForces {
     return pull;
   }
 
-  /// Energy that loads bring in the step that was solved  [J].
+  /// The work of loads in the solved step  [J].
   C work() const {
     typename Layout::Sum work(C(0.0));
     const auto inverse_h = spread(select(h() == C(0.0), C(0.0), C(1.0) / h()));
@@ -125,7 +124,8 @@ class ChainForces {
     return Layout::total(work);
   }
 
-  /// Whether a step of h resolves how fast a chain can swing, at rest ω² by Gershgorin: up to (h ω)² = 4.
+  /// Whether a step of h resolves the fastest swinging, (h ω)² <= 4, with a bound of ω² at rest by Gershgorin's
+  /// theorem.
   auto resolves(const C& h) const { return h * h * fastest_swing_ <= C(4.0); }
 
   int links_;
@@ -143,7 +143,7 @@ class ChainForces {
     for (std::size_t k = 0; k < torque.size(); ++k) torque[k] = torques_[i][k][j];
     std::array<Cell, D> turning;
     Space::Link::torque_load(torque, rod, turning);
-    const auto& drag = spread(constants_[i].drag);
+    const auto& drag = spread(constants_[i].drag);  // damping, λ/l²
     return components<D>([&](std::size_t k) { return Cell(drag * advance[k] - turning[k]); });
   }
 

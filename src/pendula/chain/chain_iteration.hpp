@@ -12,10 +12,10 @@
 
 namespace pendula {
 
-/// Weight of the squared corrections of a tangent beside those of its motion, which is solved to so many more digits.
+/// Weight of the squared corrections of a tangent beside those of its motion: the motion is solved to more digits.
 inline constexpr double solved_share = 1e-12;
 
-/// sum + x²; of a number with its derivative, also the derivative's square with that weight.
+/// sum + x². For a number with its derivative, the square of the derivative is added, too, with that weight.
 template <class L>
 [[gnu::always_inline]] inline L add_square(const L& x, const L& sum) {
   return fma(x, x, sum);
@@ -25,21 +25,21 @@ template <class L>
   return fma(L(solved_share) * x.slope, x.slope, fma(x.value, x.value, sum));
 }
 
-/// A mask for `select` that takes all: the compiler leaves the selection out.
+/// A mask for `select` that is always true: the compiler leaves the selection out.
 struct Everyone {};
 template <class T>
 [[gnu::always_inline]] inline const T& select(Everyone, const T& yes, const T&) {
   return yes;
 }
 
-/// One fixed-point iteration on the stages of a chain: from increments and multipliers rods and free rates, and from
-/// these increments and multipliers again. It costs a fraction of a Newton iteration, and converges where the step is
-/// small against the chain's fastest motion.
+/// One fixed-point iteration on the stages of a chain: rods and free rates follow from increments and multipliers, and
+/// new increments and multipliers from these. It costs a fraction of a Newton iteration, and converges where the step
+/// is short compared with the chain's fastest motion.
 ///
 /// Pointers and coefficients that every link needs are members here, so that they stay in registers: otherwise a
 /// compiler must assume that stores to stages change them. Rows are worked on cell by cell, by two cells at a time
-/// where there are several, so that the latency of one hides that of the other. A rod whose row is one cell is placed
-/// where the sweep comes to it.
+/// where there are several, so that the latency of one hides that of the other. With several cells a row, all rods are
+/// placed in a pass of their own, before the sweeps. With one, the sweep places each rod when it reaches it.
 template <class Motion>
 class ChainIteration {
   using Num = typename Motion::Num;
@@ -70,15 +70,15 @@ class ChainIteration {
         gravity_(motion.gravity_),
         columns_(motion.columns_.at_hand()) {}
 
-  /// Iterates those that are `active`; gives Σ (h b Δω)² over stages and links. visit(i, (h b Δξ̇)² of link i at the
-  /// stages of some cells).
+  /// Iterates those that are `active`. Returns Σ (h b Δω)² over stages and links. Calls visit(i, (h b Δξ̇)² of link i at
+  /// the stages of some cells).
   template <class Who, class Visit>
   [[gnu::always_inline]] C iterate(const Who& active, Visit visit) {
     Sum change(C(0.0));
     if constexpr (!places_on_the_way) {
       for_links([&](auto i) PENDULA_WRITTEN_OUT { place(i, pulled_[i]); });
       if (pulls_more_) motion_.pull_more();
-      if constexpr (Layout::stages > 2) asm volatile("" ::: "memory");  // sweeps read what was placed where it stands
+      if constexpr (Layout::stages > 2) asm volatile("" ::: "memory");  // so that sweeps read placed rods from memory
     }
     detail::unrolled<Layout::cells / Layout::together>([&](auto group) PENDULA_WRITTEN_OUT {
       sweep<group * Layout::together, Layout::together>(active, change, visit);
@@ -97,7 +97,7 @@ class ChainIteration {
   static constexpr bool places_on_the_way = Motion::places_on_the_way;
   static constexpr bool is_short = detail::is_short_chain<N>;
 
-  // A rod that was placed, at one cell: held in registers, or where it stands in memory.
+  // A placed rod at one cell: PlacedHere holds it in registers, PlacedThere refers to memory.
   struct PlacedHere {
     Point rods, pulls;
     Cell product;
@@ -130,7 +130,7 @@ class ChainIteration {
     detail::for_links<N>(links(), body);
   }
 
-  // X of a link at all stages, and the integral of its pull up to each.
+  // Computes X of a link at all stages, and the integral of its pull up to each stage.
   [[gnu::always_inline]] void place(int i, typename Motion::Pulled& pulled) {
     Stage& stage = stages_[i];
     Point rods, advances, pulls;  // of the only cell
@@ -176,7 +176,8 @@ class ChainIteration {
     }
   }
 
-  // Multipliers and increments of `Count` cells from `First` on: from the tip to the pivot and back.
+  // Computes multipliers and increments of `Count` cells from `First` on, in a sweep from the tip to the pivot and
+  // back.
   template <int First, int Count, class Who, class Visit>
   [[gnu::always_inline]] void sweep(const Who& active, Sum& change, Visit& visit) {
     if constexpr (is_short) {
@@ -244,7 +245,7 @@ class ChainIteration {
     });
   }
 
-  // Two links take one division: both multipliers, whose rows have no coupling then.
+  // A chain of two links takes one division: both multipliers are found here, as rows without coupling.
   template <int c, class Links>
   [[gnu::always_inline]] void eliminate(int i, Links& kept, const Cell& square, const Cell& before, const Cell& right,
                                         MultiplierRow<Cell>& row, const Cell& beyond) {

@@ -19,7 +19,7 @@ namespace pendula {
 
 namespace detail {
 
-/// What workspaces hold before anybody wrote there: NaN where the build hunts for reads of it, otherwise zero.
+/// The value that workspaces are filled with: NaN in builds that search for reads of unwritten numbers, otherwise zero.
 template <class Real>
 Real unwritten() {
 #ifdef EIGEN_INITIALIZE_MATRICES_BY_NAN
@@ -34,7 +34,7 @@ struct AlignedDelete {
 };
 
 /// `PerLink` numbers a link in one block aligned for packs; on the stack where the number of links N is known.
-/// Up to eight more numbers can be read after the last. To assign an array of as many links allocates nothing.
+/// Up to eight more numbers can be read after the last. Assignment of an array of the same size allocates nothing.
 template <int PerLink, int N, class Real = double>
 class LinkArray {
   static_assert(std::is_trivially_destructible_v<Real>);
@@ -161,19 +161,19 @@ Real largest_across(const std::array<Real, D>& a, const std::array<Real, D>& b) 
   return largest;
 }
 
-/// What the sweeps along a chain need to know of one link, of one motion or of several members. Unused lanes hold a
-/// chain of links like this.
+/// The constants of one link that sweeps along a chain need, of one motion or of several members. The default values
+/// are those of unused lanes.
 template <class Real>
 struct LinkConstants {
   Real mass{1.0}, length{1.0};
   Real inverse_length{1.0}, inverse_square{1.0};     ///< 1/l, 1/l²
   Twofold<Real> inverse_mass{Real(1.0), Real(0.0)};  ///< 1/m
   Real inverse_masses{1.0};  ///< 1/m_i + 1/m_{i−1}, of the bobs at both ends of the rod; 1/m_0 = 0
-  Real drag{0.0};            ///< λ/l²
+  Real drag{0.0};            ///< damping: λ/l²
   Real weight{1.0};          ///< M g, M the mass that the rod carries
-  Real hanging{0.0};         ///< M |g|/l, its tension over its length where the chain hangs at rest
+  Real hanging{0.0};         ///< M |g|/l, tension over length where the chain hangs at rest
 
-  /// Takes over a link of one of several members.
+  /// Sets the constants of this link for one of several members.
   void set(int member, const LinkConstants<double>& given) {
     const auto take = [member](Real& number, double value) { pendula::set(number, member, value); };
     take(mass, given.mass);
@@ -191,12 +191,12 @@ struct LinkConstants {
 
 namespace detail {
 
-/// κ over n² |g|/L, for n links of the length L together: κ is close to what a chain's modes swing with.
+/// κ is this many n² |g|/L, for n links of total length L: close to the ω² of a chain's modes.
 inline constexpr double slowest_pace_factor = 0.15;
 
 }  // namespace detail
 
-/// κ, which R² of a chain at rest is (docs/explanation/steps.md)  [1/s²]; `length` is the sum of the links' lengths.
+/// κ, the R² of a chain at rest (docs/explanation/steps.md)  [1/s²]; `length` is the sum of the links' lengths.
 template <class Real>
 Real slowest_pace_squared(Real links, Real gravity, Real length) {
   using std::abs;
@@ -236,9 +236,10 @@ class ChainLinks {
     }
   }
   bool loaded() const { return loaded_; }
-  /// Whether a step of h resolves how fast the chain can swing, at rest ω² by Gershgorin: up to (h ω)² = 4.
+  /// Whether a step of h resolves the fastest swinging, (h ω)² <= 4, with a bound of ω² at rest by Gershgorin's
+  /// theorem.
   bool resolves(Real h) const { return !(h * h * fastest_swing_ > Real(4)); }
-  /// That ω²  [1/s²].
+  /// The bound of ω²  [1/s²].
   Real fastest_swing_squared() const { return fastest_swing_; }
   const LinkConstants<Real>& operator[](int link) const { return constants_[link]; }
 

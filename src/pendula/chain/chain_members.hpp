@@ -18,11 +18,11 @@
 
 namespace pendula {
 
-/// The chains of several members of an ensemble, one member in each lane, and the stages of a Gauss step of theirs:
+/// The chains of several members of an ensemble, one member in each lane, and the stages of their Gauss steps:
 /// ChainMotion with what members need.
 ///
-/// N may be Eigen::Dynamic. With a tangent, every number has its derivative along one tangent
-/// of each member's motion: that of the step itself, which is solved with it.
+/// N may be Eigen::Dynamic. With a tangent, every number carries its derivative along one tangent of each member: that
+/// of the discrete step, solved together with it.
 template <class Space, int S, int N = Eigen::Dynamic, class Register = MemberRegister, bool with_tangent = false>
 class ChainMembers
     : public ChainMotion<
@@ -47,7 +47,7 @@ class ChainMembers
     }
   }
 
-  /// Links of the chains.
+  /// Number of links.
   int count() const { return links(); }
 
   // --- One member ---
@@ -77,7 +77,7 @@ class ChainMembers
     if constexpr (has_tangent) start_tangent(lane);
   }
 
-  /// Direction of a member's link and its rate; `find_rates` was called since the last step.
+  /// Direction of a member's link and its rate. Call `find_rates` first.
   auto heading(int lane, int i) const { return rods_.heading(lane, i, rates_[i]); }
 
   // --- All members ---
@@ -86,7 +86,7 @@ class ChainMembers
   const L& length(int i) const { return constants_[i].length; }
   const L& inverse_square(int i) const { return constants_[i].inverse_square; }
 
-  /// Rates of all rods where they are; visit(i, ξ̇_i, τ_i).
+  /// Calls visit(i, ξ̇_i, τ_i) for all rods at the present state.
   template <class Visit>
   void for_each_rate(Visit visit) {
     rods_.for_each_rate(constants_, [&](int i, const Point& rate, const Number& tau) {
@@ -98,27 +98,27 @@ class ChainMembers
     rods_.for_each_rate(constants_, [&](int i, const Point& rate, const Number&) { rates_[i] = rate; });
   }
 
-  /// Who has damping, torques or drives.
+  /// Members that have damping, torques or drives.
   Mask loaded() const { return loads_.loaded(); }
-  /// Whose fixed points may ask for shorter steps than errors do, by damping.
+  /// Members with which convergence of the fixed point may need shorter steps than errors do, because of damping.
   Mask may_be_stiff() const { return loaded(); }
-  /// The longest step in which stages sum up what members are driven by, to a tolerance.
+  /// The longest step in which stages integrate the drives to a tolerance  [s].
   L longest_step(double tolerance) const { return L(SineTurn(S, 2 * S).within(tolerance)) / loads_.fastest_drive(); }
 
-  /// What the energy at the end of the step that was solved is to be, by what loads bring  [J].
+  /// The energy that the end of the solved step should have: the present one and the work of loads  [J].
   L energy_due() {
     brought_ = loads_.any() ? select(loaded(), this->work(), L(0.0)) : L(0.0);
     return energy() + brought_;
   }
 
-  /// What an energy that ought to be `due` is compared to: Σ M |g| l, what there is, and what loads brought.
+  /// Energy errors are relative to this: Σ M |g| l + |due| + |work of loads|  [J].
   L energy_scale(const L& due) const {
     L scale(0.0);
     for (int i = 0; i < links(); ++i) scale = fma(abs(constants_[i].weight), constants_[i].length, scale);
     return scale + abs(due) + abs(brought_);
   }
 
-  /// Predicts the stages of a step of `h`, `ratio` times as long as the one that they are known from.
+  /// Predicts the stages of a step of `h`, `ratio` times as long as the one that it is predicted from.
   void prepare(const L& time, const L& h, const L& ratio, const StagePrediction<L>& kind) {
     this->columns_.prepare(h);
     if (loads_.any()) set_torques(time);
@@ -154,13 +154,13 @@ class ChainMembers
     }
   }
 
-  /// Keeps where the rods are, and goes back there.
+  /// save() keeps the rods of all members. restore(which) puts these members back to them.
   void save() { saved_ = rods_.place(); }
   void restore(const Mask& which) { rods_.go_to(saved_, which); }
 
-  /// The most that a link turns in the step, squared; never less, hardly more  [rad²].
+  /// A close upper bound of the largest turn of a link in the step, squared  [rad²].
   L turn() const { return this->turn_squared(); }
-  /// From where on stages are no motion  [rad].
+  /// With larger turns the solution of the stage equations may not be the motion  [rad].
   static constexpr double largest_turn(bool /*chosen*/) { return detail::largest_turn; }
 
   /// R in the middle of the step, squared, times h².
@@ -169,8 +169,8 @@ class ChainMembers
     return fma(this->slowest_pace_, h * h, sqrt(sqrt(this->quartic_)));
   }
 
-  /// The coefficient of the Legendre polynomial P_k in the rates, times h, relative to the length of the rod, squared;
-  /// with a share of the tangent's: where the motion stands still, nothing else tells which steps are too long.
+  /// The largest coefficient of the Legendre polynomial P_k in the rates, times h, relative to the length of the rod,
+  /// squared. With a share of that of the tangent, which alone limits steps where the motion rests.
   PENDULA_IN_REGISTERS L decay(int k) const {
     L largest(0.0);
     for (int i = 0; i < links(); ++i) {
@@ -189,8 +189,8 @@ class ChainMembers
     return largest;
   }
 
-  /// The most that the polynomials through the stages' rates miss the rate of a rod at the start of the step, times h,
-  /// relative to its length, squared.
+  /// The largest error, at the start of the step, of the polynomials through the stages' rates, times h, relative to
+  /// the length of the rod, squared.
   L missed_at_start() {
     L largest(0.0);
     for_each_rate([&](int i, const Vector& rate, const L&) {
@@ -214,8 +214,8 @@ class ChainMembers
     rods_.restore_lengths(constants_, due);
   }
 
-  /// The logarithm of how long the tangents of these members have grown since they had the length 1, which they have
-  /// again after this.
+  /// The logarithm of the growth of these members' tangents since their length was 1. Scales them to the length 1
+  /// again.
   L take_growth(const Mask& which) requires with_tangent {
     find_rates();
     L squared(0.0);
@@ -236,7 +236,7 @@ class ChainMembers
   const auto& past(int i) const { return this->pasts_[i][this->newest_]; }
   Eigen::Index entry(int i, std::size_t a) const { return static_cast<Eigen::Index>(a) * links() + i; }
 
-  // Of steps from `time` on, for which the columns are.
+  // Sets the torques at the stages of a step from `time`, for which the columns are prepared.
   void set_torques(const L& time) {
     for (int j = 0; j < S; ++j) {
       loads_.set_time(time + this->columns_.hc(j));
@@ -274,7 +274,7 @@ class ChainMembers
     return squared;
   }
 
-  // Of the state, and of what the next step is predicted from.
+  // Scales the tangent of the state, and of the stages that the next step is predicted from.
   void scale_tangent(const L& factor, int i) {
     const auto scale = [&](Number* numbers, std::size_t count) {
       for (std::size_t k = 0; k < count; ++k) numbers[k].slope = factor * numbers[k].slope;
@@ -288,7 +288,7 @@ class ChainMembers
   }
 
   L inverse_pace_squared_{1.0};
-  L brought_{0.0};    // by loads, in the step that is looked at
+  L brought_{0.0};    // work of loads in the step
   L restoring_{0.0};  // steps since lengths were restored
   detail::PerLink<Point, N> rates_;
   MemberLoads<Space, N, L> loads_;

@@ -20,15 +20,15 @@
 namespace pendula {
 
 /// A chain that moves by Gauss steps, of one motion (StagesInLanes) or of several members (MembersInLanes): prediction
-/// and iteration of the stages, and the end of the step. Angles are not its affair.
+/// and iteration of the stages, and the end of the step, all in rods, without angles.
 ///
 /// The field on rods ξ and free rates z (rod_state.hpp) is
 ///   ξ̇_i = z_i + e_i − e_{i−1},           e_i = (τ_i ξ_i − τ_{i+1} ξ_{i+1})/m_i,      e_0 = 0,
 ///   ż_i = d_i − d_{i−1} − δ_{i1} g up,    d_i = −(τ_i ξ̇_i − τ_{i+1} ξ̇_{i+1})/m_i,    d_0 = 0,
-/// and what ChainForces adds. Every Gauss method keeps |ξ_i|² and the vertical angular momentum, which are quadratic,
-/// and is symplectic: there is no pole and no drift (docs/explanation/method.md).
+/// and what ChainForces adds. Every Gauss method conserves |ξ_i|² and the vertical angular momentum, which are
+/// quadratic, and is symplectic: there is no pole and no drift (docs/explanation/method.md).
 ///
-/// Stages are held as increments U = h b (ξ̇ − z) and W = h b (ż + δ_{i1} g up), so that what is large enters exactly:
+/// Stages are held as increments U = h b (ξ̇ − z) and W = h b (ż + δ_{i1} g up), so that the large terms are exact:
 ///   X = ξ + h c z + m U,  Z = z − δ_{i1} h c g up + m W,  m_ij = a_ij/b_j.
 template <class SpaceType, class LayoutType, int N = Eigen::Dynamic>
 class ChainMotion : public ChainForces<SpaceType, LayoutType, N> {
@@ -54,11 +54,11 @@ class ChainMotion : public ChainForces<SpaceType, LayoutType, N> {
   /// Squared size of the step: Σ (h b ω)² over stages and links, and that of the tangent with its weight (add_square).
   const C& scale() const { return scale_; }
 
-  /// The most that a link turns in the step that was finished, squared; an upper bound, hardly more  [rad²].
+  /// A close upper bound of the largest turn of a link in the finished step, squared  [rad²].
   C turn_squared() const { return C(double(stages)) * turn_; }
 
-  /// One fixed-point iteration of those that are `active`; the stages of others stay. Gives the squared change, to be
-  /// compared with `scale`. visit(i, change of link i).
+  /// One fixed-point iteration of those that are `active`. Returns the square of what changed; compare with `scale`.
+  /// Calls visit(i, squared change of link i).
   template <class Who, class Visit>
   PENDULA_IN_REGISTERS [[gnu::noinline]] C iterate(const Who& active, Visit visit) {
     return ChainIteration<ChainMotion>(*this).iterate(active, visit);
@@ -96,7 +96,7 @@ class ChainMotion : public ChainForces<SpaceType, LayoutType, N> {
 
  protected:
   using typename Base::Stage;
-  // What later steps are predicted from.
+  // Stage values of a step, for predictions of later steps.
   struct Past {
     std::array<Row, D> advance{};  // h ξ̇
     Row tau{};
@@ -105,7 +105,7 @@ class ChainMotion : public ChainForces<SpaceType, LayoutType, N> {
     std::array<Row, D> pull;  // integral of the pull of the rod up to each stage
     Row known;                // X·z
   };
-  // What the sweep inward keeps for the sweep outward, of one link at some cells.
+  // Numbers of one link at some cells that the sweep inward keeps for the sweep outward.
   template <int Count>
   struct Elimination {
     std::array<std::array<typename Layout::Slot, D>, static_cast<std::size_t>(Count)> freed;  // Z − z
@@ -120,7 +120,7 @@ class ChainMotion : public ChainForces<SpaceType, LayoutType, N> {
     hangs_ = select(resolves(h), C(0.0), C(1.0));
     const Mask hangs = hangs_ > C(0.0), differs = !(hangs_ == hung), cold = kind.cold | differs;
     pulls_more_ = has_loads() || any(hangs);
-    if (is_batch<Num> || !all(cold)) {  // to the last bit, a member's step does not depend on its neighbours
+    if (is_batch<Num> || !all(cold)) {  // members never skip it: their bits must not depend on other lanes
       columns_.predict_at(select(kind.again, C(0.0), C(1.0)), ratio, kind.depth);
       known_ = pasts - 1;
       if constexpr (!is_batch<Num>) known_ = std::min(known_, static_cast<std::size_t>(kind.known));
@@ -131,7 +131,7 @@ class ChainMotion : public ChainForces<SpaceType, LayoutType, N> {
     newest_ = (newest_ + pasts - 1) % pasts;
   }
 
-  /// Predicts the stages as if the motion went on as it does at the start of the step.
+  /// Predicts constant rates from those at the start of the step.
   void start_cold(const Mask& cold) {
     C scale(0.0);
     const auto& columns = columns_.at_hand();
@@ -153,7 +153,7 @@ class ChainMotion : public ChainForces<SpaceType, LayoutType, N> {
     scale_ = select(cold, scale * (columns_.h() * columns_.h()), scale_);
   }
 
-  /// Sums up what the stages add to the state, which stays as it is.
+  /// Computes what the stages add to the state, which does not change yet.
   PENDULA_IN_REGISTERS [[gnu::noinline]] void finish() {
     const auto& columns = columns_.at_hand();
     typename Layout::Sum turn(C(0.0)), scale(C(0.0));
@@ -208,8 +208,8 @@ class ChainMotion : public ChainForces<SpaceType, LayoutType, N> {
   C gravity_{0.0}, slowest_pace_{1.0};  // the square of the slowest R
   C scale_{0.0}, turn_{0.0}, quartic_{0.0};
   bool pulls_more_ = false;
-  std::size_t newest_ = 0;  // of the pasts: the last step's
-  std::size_t known_ = 0;   // of the pasts: those that the step after this one may be predicted from, besides this one
+  std::size_t newest_ = 0;  // index of the last step in the pasts
+  std::size_t known_ = 0;   // number of pasts that the step after this one may be predicted from, besides this one
   detail::PerLink<std::array<Past, pasts>, N> pasts_;
   typename Rods::template Numbers<Num> moved_, total_pull_;  // over the step
   static constexpr bool is_short = detail::is_short_chain<N>;
@@ -231,8 +231,8 @@ class ChainMotion : public ChainForces<SpaceType, LayoutType, N> {
     }
   }
 
-  // Clears what members that start cold would be predicted from: its weights are zero, but zero times what is not
-  // finite is not zero.
+  // Clears the past of members that start cold. Its weights are zero, but zero times a number that is not finite is not
+  // zero.
   static void forget(std::array<Past, pasts>& past, const Mask& cold) {
     for (Past& step : past) {
       each_cell([&](auto j) {
@@ -244,8 +244,8 @@ class ChainMotion : public ChainForces<SpaceType, LayoutType, N> {
 
   // --- Prediction ---
 
-  // Takes the mean multipliers into the free rates. What is left of them at the stages is as often positive as
-  // negative, and so are the rounding errors that it makes.
+  // Changes the gauge by the mean multipliers. Those left at the stages have mean zero, so that rounding errors due to
+  // them do not add up.
   PENDULA_IN_REGISTERS [[gnu::noinline]] void predict(const Mask& follows) {
     rods_.shift_gauge([&](int i) { return predict_multipliers(i, follows); }, [&](int i) { predict_increments(i); });
   }
@@ -257,7 +257,7 @@ class ChainMotion : public ChainForces<SpaceType, LayoutType, N> {
     return history;
   }
 
-  // Predicts the multipliers of a link, takes their mean out, and gives it.
+  // Predicts the multipliers of a link, and subtracts their mean. Returns the mean.
   [[gnu::always_inline]] Num predict_multipliers(int i, const Mask& follows) {
     Row& tau = stages_[i].tau;
     columns_.extrapolate(history(i, [](const Past& past) { return &past.tau; }), tau, false);
@@ -266,7 +266,7 @@ class ChainMotion : public ChainForces<SpaceType, LayoutType, N> {
       each_cell([&](auto j) PENDULA_WRITTEN_OUT { row.set(j, row[j] - spread(lambda)); });
     };
     shift(tau);
-    for (std::size_t d = 0; d < known_; ++d) shift(pasts_[i][(newest_ + d) % pasts].tau);  // the next step's, too
+    for (std::size_t d = 0; d < known_; ++d) shift(pasts_[i][(newest_ + d) % pasts].tau);  // for later predictions
     return lambda;
   }
 
@@ -295,7 +295,7 @@ class ChainMotion : public ChainForces<SpaceType, LayoutType, N> {
     }
   }
 
-  // Places the rods anew, at the last increments of each member.
+  // Adds the forces of loads to total_pull_. Rods are placed again first, at the last increments of each member.
   PENDULA_IN_REGISTERS [[gnu::noinline]] void add_more_to_totals() {
     ChainIteration<ChainMotion> iteration(*this);
     for (int i = 0; i < links(); ++i) {
@@ -307,7 +307,8 @@ class ChainMotion : public ChainForces<SpaceType, LayoutType, N> {
 
   // --- The end of a step ---
 
-  // What the free rates of a block of rods gain by all pulls over the step. GCC heeds __restrict of parameters only.
+  // Computes what all pulls over the step add to the free rates of a block of rods. A function of its own, because GCC
+  // heeds __restrict of parameters only.
   static void push(const C* __restrict inverse_mass, const Num* __restrict pulled, Num* __restrict bond,
                    Num* __restrict pushed) {
     Rods::for_numbers([&](auto k) PENDULA_WRITTEN_OUT { bond[k + D] = inverse_mass[k] * (pulled[k + D] - pulled[k]); });

@@ -15,7 +15,7 @@ namespace pendula {
 
 /// One exact Newton iteration on all s stages of a chain at once, in O(n (d s)³) for dimension d.
 ///
-/// The stage equations, and the blocks of a link in them, stand in chain_elimination.hpp; the slip is X·V here.
+/// chain_elimination.hpp has the stage equations, and the blocks of a link in them. The slip is X·V here.
 /// Multipliers follow from E₂ τ = X̂·(G − H f(τ = 0)). Inward, with δG_{i+1} = P δw_i + g from the link below and
 /// B = P + m I:
 ///   S = L (B − N) Z,  K = −S⁻¹ L B,  k = −S⁻¹ L ((B − N) v₀ + g − q),  P ← B + B Z K,  g ← g + B (v₀ + Z k),
@@ -27,14 +27,14 @@ class ChainNewton : private ChainElimination<Space, S, N, Real, Arch> {
  public:
   using Stages = ChainStages<Space, S, N, Real, Arch>;
 
-  /// The gains of so many links are kept, because those of a long chain would take more memory than everything else.
-  /// For the other links they are computed a second time, to the same bits, when the sweep outward reaches them.
+  /// Most links whose gains are kept: those of a long chain would take more memory than everything else. Gains of other
+  /// links are computed a second time, to the same bits, when the sweep outward reaches them.
   static constexpr int most_kept = 4096;
 
   explicit ChainNewton(int links, int kept = most_kept)
       : block_(kept), gains_(std::min(links, kept)), below_(static_cast<std::size_t>(std::max(links - 1, 0) / kept)) {}
 
-  /// From now on asks `stop` after every `most_kept` links. What an iteration finds that it ends is of no use.
+  /// From now on asks `stop` after every `most_kept` links. The result of an iteration that it ends is useless.
   void set_stop_sign(StopSign stop) { stop_ = stop; }
 
   /// Improves increments and multipliers once.
@@ -55,7 +55,7 @@ class ChainNewton : private ChainElimination<Space, S, N, Real, Arch> {
     return worst.link();
   }
 
-  /// The multipliers that belong to the increments as they are.
+  /// Computes the multipliers that belong to the present increments.
   PENDULA_IN_REGISTERS void find_multipliers(Stages& stages) {
     set_coefficients(stages.columns());
     run_out(stages);
@@ -97,7 +97,7 @@ class ChainNewton : private ChainElimination<Space, S, N, Real, Arch> {
     Real k[unknowns] = {};
   };
 
-  // Places the rods at the stages, and keeps what the velocities of the bobs have gained since the start of the step.
+  // Places the rods at the stages, and keeps the changes of the bobs' velocities since the start of the step.
   PENDULA_IN_REGISTERS void run_out(Stages& stages) {
     Vector w = zero();
     for (int i = 0; i < stages.links(); ++i) {
@@ -107,7 +107,8 @@ class ChainNewton : private ChainElimination<Space, S, N, Real, Arch> {
     }
   }
 
-  // Adds the mass of the next bob to the diagonal of P one link early, where nothing has to wait for it.
+  // The sweep from the tip to the pivot. It adds the mass of the next bob to the diagonal of P one link early, where no
+  // operation has to wait for it.
   PENDULA_IN_REGISTERS void inward(Stages& stages) {
     positive_ = true;
     CarriedMomentum carried;
@@ -133,7 +134,7 @@ class ChainNewton : private ChainElimination<Space, S, N, Real, Arch> {
     carried.G = G;
   }
 
-  // τ, −E₂⁻¹ and the residual q.
+  // Finds τ, −E₂⁻¹ and the residual q.
   void find_multiplier(Stages& stages, int i, const Vector& G, Terms& terms) {
     find_inverse(terms);
     const Vector pushed = stages.impulse_without_multiplier(i, stages.kept_rod(i));
@@ -161,7 +162,7 @@ class ChainNewton : private ChainElimination<Space, S, N, Real, Arch> {
     const bool first = i == 0, last = i + 1 == stages.links();
     Tangents BZ, own;
     Block<unknowns, vectors> across;       // L
-    Block<unknowns, unknowns + 1> pivots;  // S, and what k is made of
+    Block<unknowns, unknowns + 1> pivots;  // S, and the right-hand side of k
     find_null_space(terms, terms.slip, gain.Z);
     find_annihilator(terms, across);
     last ? set_scaled(carried.P[0][0], gain.Z, BZ) : set_product(carried.P, gain.Z, BZ);
@@ -196,8 +197,8 @@ class ChainNewton : private ChainElimination<Space, S, N, Real, Arch> {
     }
   }
 
-  // From the pivot to the tip: changes all stages. It computes number by number, not in lanes: so a link waits less for
-  // the one before.
+  // The sweep from the pivot to the tip, which changes all stages. It computes with single numbers, not in lanes, so
+  // that a link waits less for the one before.
   PENDULA_IN_REGISTERS Correction outward(Stages& stages, detail::WorstLink<Real>* worst = nullptr) {
     Real dw[vectors] = {};
     detail::StageChange<S, L> change;

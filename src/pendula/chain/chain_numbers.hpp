@@ -28,7 +28,7 @@ std::vector<PlainChain::Drive> plain_drives(const Chain<Space, N>& chain) {
   return drives;
 }
 
-/// `chain` as plain numbers, which live as long as it and `drives`.
+/// `chain` as plain numbers. They are valid as long as `chain` and `drives`.
 template <class Space, int N>
 PlainChain plain(const Chain<Space, N>& chain, std::span<const PlainChain::Drive> drives) {
   return {chain.links(),
@@ -40,7 +40,7 @@ PlainChain plain(const Chain<Space, N>& chain, std::span<const PlainChain::Drive
           drives};
 }
 
-/// The chain that `plain` was made from, which has N links if that is known.
+/// The chain that `plain` was made from. It must have N links, unless N is Eigen::Dynamic.
 template <class Space, int N = Eigen::Dynamic>
 Chain<Space, N> chain_of(const PlainChain& plain) {
   const auto numbers = [&](const double* values) { return Eigen::Map<const Eigen::VectorXd>(values, plain.links); };
@@ -77,7 +77,7 @@ class ChainSystem {
     }
   }
 
-  /// Lives as long as this.
+  /// Valid as long as this object.
   PlainSystem plain() const { return {parameters_.data(), inputs_.data(), sines_}; }
 
  private:
@@ -85,12 +85,12 @@ class ChainSystem {
   std::vector<InputSine> sines_;
 };
 
-/// The space that a chain's generated kernel lives in.
+/// The space of a chain's generated kernel.
 template <class Kernel>
 using SpaceOf = std::conditional_t<Kernel::dof == 1, Planar, Spatial>;
 
-/// The system that a generated kernel makes of a chain. Throws std::invalid_argument if the kernel is for another
-/// number of links.
+/// A chain as a system of a generated kernel. Throws std::invalid_argument if the kernel is for another number of
+/// links.
 template <class Kernel, class Space, int N>
 SystemModel system_of(const Chain<Space, N>& chain) {
   if (chain.links() != Kernel::links) {

@@ -27,8 +27,8 @@ constexpr double newton_cost(int stages) {
   return (Space::dof == 1 ? planar : spatial)[static_cast<std::size_t>(stages - 1)];
 }
 
-/// A StageSolver for chains in momentum form, in O(n): by exact Newton, by fixed point, or by whichever takes less.
-/// Poles are no obstacle. Real is any floating-point type; float and double are computed with in SIMD registers.
+/// A StageSolver for chains in momentum form, in O(n): by exact Newton, by fixed point, or by whichever costs less. It
+/// has no poles. Real is any floating-point type; float and double use SIMD registers.
 template <class SpaceType, int S, int N = Eigen::Dynamic, class RealType = double, class Arch = xsimd::default_arch>
 class ChainSolver : public StageIterations<ChainStages<SpaceType, S, N, RealType, Arch>> {
   using Base = StageIterations<ChainStages<SpaceType, S, N, RealType, Arch>>;
@@ -38,7 +38,7 @@ class ChainSolver : public StageIterations<ChainStages<SpaceType, S, N, RealType
   using Model = Chain<Space, N>;
   using typename Base::Real, typename Base::State;
 
-  /// Throws std::invalid_argument unless `stages` is S, and the method has so many.
+  /// Throws std::invalid_argument unless `stages` is S and the method exists with S stages.
   ChainSolver(const Model& chain, int stages, Iteration iteration = Iteration::automatic, Family family = Family::gauss)
       : Base(iteration, newton_cost<Space>(S), chain, family),
         family_(family),
@@ -55,7 +55,7 @@ class ChainSolver : public StageIterations<ChainStages<SpaceType, S, N, RealType
   Correction correct() { return Base::correct(newton_, stages_.links()); }
   void set_stop_sign(StopSign stop) { newton_.set_stop_sign(stop); }
 
-  /// Iterations do not note which link they change most: one more finds out.
+  /// The link that a failure names. Iterations do not record which link they change most: one more finds out.
   int part_of(Status status) {
     if (status == Status::singular_mass_matrix || status == Status::wrong_root) return -1;
     return is_by_newton() ? newton_.worst_link(stages_) : stages_.worst_link();
@@ -86,7 +86,7 @@ class ChainSolver : public StageIterations<ChainStages<SpaceType, S, N, RealType
     return brought;
   }
 
-  /// The derivative of the step that was solved and not yet accepted.
+  /// linearize() gives the derivative of the step that was solved and not yet accepted.
   using Tangent = ChainTangent<Space, S, N, Real, Arch>;
   Tangent make_tangent() const { return Tangent(stages_.links()); }
   void linearize(Tangent& tangent) {

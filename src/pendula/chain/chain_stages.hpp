@@ -23,8 +23,8 @@
 
 namespace pendula {
 
-/// State and stages of one chain, as both iterations see them: the fixed point of ChainMotion, and Newton's. All stages
-/// of one number are the lanes of a Lanes<S, Real>.
+/// State and stages of one chain, for both iterations: the fixed point of ChainMotion, and Newton's. All stages of one
+/// number are the lanes of a Lanes<S, Real>.
 template <class Space, int S, int N = Eigen::Dynamic, class RealType = double, class Arch = xsimd::default_arch>
 class ChainStages : public ChainTurns<Space, S, N, RealType> {
   using Base = ChainTurns<Space, S, N, RealType>;
@@ -70,7 +70,7 @@ class ChainStages : public ChainTurns<Space, S, N, RealType> {
     stages_[i].tau.set(0, tau);
   }
 
-  /// Where a rod is at the stages.
+  /// X, a rod at the stages.
   Vector place(int i) const {
     const L hc = columns_.hc(), hc_low = columns_.hc_low();
     return components<D>([&](std::size_t k) {
@@ -80,7 +80,7 @@ class ChainStages : public ChainTurns<Space, S, N, RealType> {
     });
   }
 
-  /// h b times the sum of τ ξ̇, damping and torque, where the rod is X.
+  /// h b times the sum of τ ξ̇, damping and torque, with the rod at X.
   Vector pull(int i, const Vector& X) const {
     const Vector moved = advance(i), pull = scaled(multiplier(i), moved);
     return this->pulls_more_ ? sum(pull, this->more_pull(i, 0, columns_.hb(), X, moved)) : pull;
@@ -89,7 +89,7 @@ class ChainStages : public ChainTurns<Space, S, N, RealType> {
   /// h b ξ̇.
   Vector advance(int i) const { return Base::advance(i, 0); }
 
-  /// Σ_j h a_kj f(j) at the stages k of all forces f on a rod but its multiplier's, where the rod is X.
+  /// Σ_j h a_kj f(j) at the stages k, with f all forces on a rod except its multiplier's, and the rod at X.
   Vector impulse_without_multiplier(int i, const Vector& X) const {
     Vector impulse;
     impulse.fill(L(Real(0)));
@@ -110,7 +110,7 @@ class ChainStages : public ChainTurns<Space, S, N, RealType> {
     return components<Space::torque_components>([&](std::size_t k) { return this->torques_[i][k][0]; });
   }
 
-  /// What Newton keeps between its sweeps: rods at the stages, and what the velocity of the bob gains up to there.
+  /// Newton keeps these between its sweeps: rods at the stages, and the changes of the bob's velocity up to there.
   void set_kept(int i, const Vector& rod, const Vector& gained) {
     for (std::size_t k = 0; k < D; ++k) {
       stages_[i].rod[k].set(0, rod[k]);
@@ -160,8 +160,8 @@ class ChainStages : public ChainTurns<Space, S, N, RealType> {
     prediction_.forget();
   }
 
-  /// One fixed-point iteration; its change, relative to the size of the step. visit(i, squared changes of link i at
-  /// the stages).
+  /// One fixed-point iteration. Returns its change, relative to the size of the step. Calls visit(i, squared changes of
+  /// link i at the stages).
   template <class Visit>
   double iterate(Visit visit) {
     const Real changed = Base::iterate(Everyone{}, visit);
@@ -174,7 +174,7 @@ class ChainStages : public ChainTurns<Space, S, N, RealType> {
     return iterate([](int, const L&) {});
   }
 
-  /// Takes note of the first of these changes in a step.
+  /// Takes the first of these changes in a step.
   void see_first(double change) { prediction_.see_first(change); }
 
   /// The link that one more fixed-point iteration changes most.
@@ -186,14 +186,14 @@ class ChainStages : public ChainTurns<Space, S, N, RealType> {
     return worst.link();
   }
 
-  /// The most that a link turns in the step  [rad].
+  /// The largest turn of a link in the step  [rad].
   double turn() {
     if (!is_finished_) finish();
     return turn_;
   }
 
-  /// Energy at the end of the step less that of its start and what loads bring, relative to kinetic energy, Σ M |g| l
-  /// and what loads bring. On the motion it is the error of the method.
+  /// The change of the energy in the step less the work of loads, relative to kinetic energy + Σ M |g| l + work. On the
+  /// motion it is the error of the method.
   double energy_defect() {
     if (!is_finished_) finish();
     const Energies start = energies();
@@ -205,8 +205,8 @@ class ChainStages : public ChainTurns<Space, S, N, RealType> {
     return static_cast<double>(end.total() - start.total() - brought) / scale_of(start, brought);
   }
 
-  /// How far the polynomials through the stages' rates miss the velocity of a bob at the start of the step, relative to
-  /// the fastest bob so far.
+  /// The largest error, at the start of the step, of bobs' velocities by the polynomials through the stages' rates,
+  /// relative to the fastest bob so far.
   [[gnu::noinline]] double defect() {
     Numbers bob{}, missed{}, last{};
     Real furthest(0);
@@ -224,7 +224,7 @@ class ChainStages : public ChainTurns<Space, S, N, RealType> {
     return furthest > 0 ? std::sqrt(static_cast<double>(furthest) / std::max(fastest_, StepShape::slow_squared * fall))
                         : 0;
   }
-  /// How much larger the error of the prediction is than that defect.
+  /// By which factor the error of the prediction exceeds that defect (StepPrediction::gain).
   double predictor_gain() const {
     return prediction_.gain([&] { return columns_.predictor_gain(); });
   }
@@ -235,7 +235,7 @@ class ChainStages : public ChainTurns<Space, S, N, RealType> {
     return {static_cast<double>(pace), static_cast<double>(quickening)};
   }
 
-  /// What the error of the step follows from.
+  /// The shape of the solved step, which shows its error.
   PENDULA_IN_REGISTERS StepShape shape() const {
     L quartic(Real(0)), decay(Real(0));
     alignas(pack_alignment) Real inverse[Z] = {};
@@ -260,7 +260,7 @@ class ChainStages : public ChainTurns<Space, S, N, RealType> {
     return shape;
   }
 
-  /// Energy that loads bring in the step  [J].
+  /// The work of loads in the step  [J].
   double brought() const { return loaded() ? static_cast<double>(Base::work()) : 0; }
 
   /// Moves the state to the end of the step.
@@ -303,8 +303,8 @@ class ChainStages : public ChainTurns<Space, S, N, RealType> {
     return shape;
   }
 
-  // The most that the polynomials through the stages' rates miss the rate of a rod at the start of the step, times h,
-  // relative to its length.
+  // The largest error, at the start of the step, of the polynomials through the stages' rates, times h, relative to the
+  // length of the rod.
   double missed_at_start() const {
     Real furthest(0);
     rods_.for_each_rate(constants_, [&](int i, const Numbers& rate, const Real&) {
@@ -360,7 +360,7 @@ class ChainStages : public ChainTurns<Space, S, N, RealType> {
 
   Chain<Space, N> chain_;
   std::int64_t
-      restoring_interval_;  // steps after which lengths are restored; Gauss methods keep them, but for rounding
+      restoring_interval_;  // steps after which lengths are restored: Gauss methods conserve them, except for rounding
   typename Base::Rods::FullState trial_{links()};
   double fastest_ = 0;  // squared velocity of the fastest bob so far  [m²/s²]
   bool torque_is_set_ = false, is_finished_ = false, is_first_ = true;

@@ -40,15 +40,16 @@ void add_transposed_product(const Real (&a)[Rows][Columns], const Row* x, Row* y
 
 }  // namespace detail
 
-/// The derivative of one Gauss step of a chain, exactly that of the discrete step: the stage equations of
-/// chain_elimination.hpp, linearised where they are solved (implicit function theorem), eliminated once along the chain
-/// in O(n), and then applied to any direction in O(n).
+/// The exact derivative of one discrete Gauss step of a chain. The stage equations of chain_elimination.hpp are
+/// linearised at their solution (implicit function theorem) and eliminated once along the chain, in O(n). Then each
+/// direction takes O(n).
 ///
-/// Coordinates of the tangent space are δû_i, of the directions, and δμ_i, of the angular momenta across them,
-///   μ_i = l_i (y_i − (y_i·ξ_i/l_i²) ξ_i),
-/// in components of RodFrame: all δû, link by link  [1], then all δμ  [N m s]. In the plane they are δθ and δp, p =
-/// ∂L/∂θ̇; in space the three components of vectors across û in the axes of the world, so that nothing happens at a pole
-/// (what a seed has along û is left out). The form Σ δû·δμ' − δμ·δû' is kept where nothing damps.
+/// A tangent has, for each link i, the change δû_i of its direction, and the change δμ_i of its angular momentum across
+/// the direction,
+///   μ_i = l_i (y_i − (y_i·ξ_i/l_i²) ξ_i).
+/// First come all δû  [1], link by link, then all δμ  [N m s]. In the plane they are δθ_i and δp_i, p = ∂L/∂θ̇. In
+/// space each is a vector across û in the axes of the world, so that poles need no care; a part along û that a seed has
+/// is left out. The form Σ δû·δμ' − δμ·δû' is kept where nothing damps.
 ///
 /// Parameters are the masses, lengths, dampings of all links, gravity, and then the components of a torque on every
 /// link that is constant through the step, (3n + 1 + torque_components n)  [kg, m, N m s, m/s², N m].
@@ -58,8 +59,7 @@ void add_transposed_product(const Real (&a)[Rows][Columns], const Row* x, Row* y
 ///   α* = J ((B − N) v₀ + g − r),  g ← g + B (v₀ + Z α*),
 /// outward δV = v₀ + Z (α* + K δw_{i−1}), and multipliers and momenta follow with
 ///   δτ = E₂⁻¹ X̂·(g + B δw − r − N δV),  δy = Σ_j h b_j δf(j).
-/// All of this is linear, so that its small matrices are kept; the adjoint goes through their transposes, the other
-/// way.
+/// All of this is linear: its small matrices are kept, and the adjoint applies their transposes in reverse order.
 template <class Space, int S, int N = Eigen::Dynamic, class RealType = double, class Arch = xsimd::default_arch>
 class ChainTangent {
   using Maps = StepMaps<Space, S, N, RealType, Arch>;
@@ -82,7 +82,7 @@ class ChainTangent {
   /// Rows of a variation of the parameters.
   int parameters() const { return parameters(links_); }
 
-  /// The derivative of the step whose stages are found and that was not accepted yet.
+  /// Computes the derivative of the step that was solved and not yet accepted.
   void linearize(const Stages& stages) { maps_.linearize(stages); }
 
   /// Replaces tangents at the start of the step, (size x count) row by row, by those at its end.
@@ -104,7 +104,7 @@ class ChainTangent {
     in_rows(gradients, count, [&](int, int) { pull_rows<false>(); });
   }
 
-  /// Adds those with respect to the parameters, too, to (parameters x count).
+  /// The same, and adds gradients with respect to the parameters to `parameters`, (parameters x count).
   void pull(Real* gradients, int count, Real* parameters) {
     in_rows(gradients, count, [&](int begin, int columns) {
       load(parameters + begin, count, columns, numbers_);
@@ -117,7 +117,7 @@ class ChainTangent {
   static constexpr std::size_t f = Maps::f, u = Maps::u, vectors = Maps::vectors, others = Maps::others,
                                torques = Maps::torques;
 
-  // Right-hand sides that go through the chain together, a row of them a pack.
+  // Number of directions that go through the chain together, in the lanes of a Row.
   static constexpr int width = 2 * detail::register_size<RegisterFor<8, Real>>;
   static constexpr auto held = static_cast<std::size_t>(width);
   using Row = Pack<width, RegisterFor<width, Real>>;
@@ -140,7 +140,7 @@ class ChainTangent {
     }
   }
 
-  // through(first column, columns) between loading and storing as many as a row holds.
+  // Loads as many columns as a Row holds, calls through(first column, columns), and stores them; for all columns.
   template <class Through>
   void in_rows(Real* tangents, int count, Through through) {
     for (int begin = 0; begin < count; begin += width) {
@@ -151,7 +151,7 @@ class ChainTangent {
     }
   }
 
-  // Rows of one link, of all that it is varied by.
+  // Rows of one link: δû, δμ, and its parameters.
   Row* directions(int i) { return rows_.data() + count(i) * f; }
   Row* momenta(int i) { return rows_.data() + count(links_ + i) * f; }
   Row& mass(int i) { return numbers_[count(i)]; }
@@ -177,7 +177,7 @@ class ChainTangent {
     return std::all_of(numbers, numbers + held, [](const Real& x) { return x == 0; });
   }
 
-  // Links beyond feel nothing on the way in.
+  // The outermost link with a change at the start; links beyond it can be skipped on the way in.
   int outermost() {
     for (int i = links_ - 1; i > 0; --i) {
       for (std::size_t a = 0; a < f; ++a) {
@@ -243,7 +243,7 @@ class ChainTangent {
     }
   }
 
-  // Adds gradients with respect to the parameters of link i; gives that of M.
+  // Adds gradients with respect to the parameters of link i. Returns that of M.
   template <class Map, class OfLength>
   Row pull_parameters(int i, const Map& map, const Row* x, const OfLength& of_length, const Row* y) {
     Varied sums;
@@ -286,7 +286,7 @@ class ChainTangent {
   PENDULA_IN_REGISTERS void pull_out() {
     Row g[vectors];
     std::fill_n(g, vectors, Row(Real(0)));
-    Row before(Real(0));  // gradients of M_j, j up to here: all that the mass of this bob is in
+    Row before(Real(0));  // sum of the gradients of M_j, j up to here: each M_j contains the mass of this bob
     for (int i = 0; i < links_; ++i) {
       const auto& maps = maps_.of(i);
       Row x[u + 2 * f];
@@ -309,7 +309,7 @@ class ChainTangent {
   }
 
   Maps maps_;
-  std::vector<Row> alpha_, momentum_;  // of all links: α, and what μ ends with of g
+  std::vector<Row> alpha_, momentum_;  // of all links: α, and the part of δμ at the end that comes from g
   std::vector<Row> rows_, numbers_;    // tangents, parameters
   std::vector<Row> below_;             // M
   int links_;

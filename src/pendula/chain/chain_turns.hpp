@@ -14,8 +14,8 @@
 
 namespace pendula {
 
-/// The angles of one chain whose rods move by Gauss steps. Of all angles that describe a rod, they are those that the
-/// motion has led to, at the end of a step and within it.
+/// The angles of one chain whose rods move by Gauss steps, at the end of a step and within it. Of all angles of a rod,
+/// they are those to which the motion has led.
 template <class Space, int S, int N, class Real>
 class ChainTurns : public ChainMotion<Space, StagesInLanes<S, Real>, N> {
   using Base = ChainMotion<Space, StagesInLanes<S, Real>, N>;
@@ -65,8 +65,8 @@ class ChainTurns : public ChainMotion<Space, StagesInLanes<S, Real>, N> {
     return state;
   }
 
-  /// Bounds of how far angles and their rates get within the last step from where they began: infinite for those near
-  /// a pole.
+  /// Sets q and v to bounds of how far angles and their rates get within the last step from their values at its start:
+  /// infinite near a pole.
   bool bound_excursions(const FullState& begin, double* q, double* v) const {
     using std::abs;
     const Real h = abs(Real(prediction_.last_h()));
@@ -92,7 +92,7 @@ class ChainTurns : public ChainMotion<Space, StagesInLanes<S, Real>, N> {
     return sum;
   }
 
-  // The rate of a rod x steps after the beginning of the last step, and the rod there, which began at `along`.
+  // rate_at: the rate of a rod x steps after the start of the last step. rod_in_step: the rod there, from `along` on.
   Numbers rate_at(int i, const Real& x, const Real& h) const {
     const Weights weights = columns_.values(x);
     return components<D>([&](std::size_t k) {
@@ -106,7 +106,7 @@ class ChainTurns : public ChainMotion<Space, StagesInLanes<S, Real>, N> {
   struct Excursions {
     std::array<Real, Space::dof> angles, rates;
   };
-  // In the plane an angle's rate is smooth wherever the rod is: its stages tell all of it. h is the size of the step.
+  // In the plane the rate of an angle is smooth everywhere, so that its stages give the bounds. h is the step size.
   Excursions excursions_of(const Real* along, int i, const Real& h) const requires(Space::dof == 1) {
     std::array<L, D> rod, moved;
     for (std::size_t k = 0; k < D; ++k) {
@@ -118,7 +118,7 @@ class ChainTurns : public ChainMotion<Space, StagesInLanes<S, Real>, N> {
     const auto [turn, change] = columns_.excursion(turned);
     return {{turn}, {change / h}};
   }
-  // In space rates of angles are narrow by a pole: from bounds of the rod, which is as long as it ever was.
+  // In space rates of angles have narrow peaks near a pole: bounds follow from those of the rod, of constant length.
   Excursions excursions_of(const Real* along, int i, const Real& h) const requires(Space::dof > 1) {
     using std::asin, std::sqrt;
     const Real& inverse_length = constants_[i].inverse_length;
@@ -131,14 +131,14 @@ class ChainTurns : public ChainMotion<Space, StagesInLanes<S, Real>, N> {
       changed_by[k] = inverse_length * change / h;
     }
     const Real far = sqrt(dot(moved_by, moved_by)), change = sqrt(dot(changed_by, changed_by)), fastest = far / h;
-    const Real level = inverse_length * sqrt(along[0] * along[0] + along[1] * along[1]);  // from the axis by the pole
+    const Real level = inverse_length * sqrt(along[0] * along[0] + along[1] * along[1]);  // distance from the axis
     const Real nearest = level - far;
     constexpr Real infinite = std::numeric_limits<Real>::infinity();
     Excursions bounds;
     bounds.angles = {far < 1 ? Real(asin(far)) : infinite, infinite};
     bounds.rates.fill(infinite);
     if (!(nearest > Real(0.1) * level)) return bounds;
-    // theta_dot is how fast the rod climbs over its level, phi_dot how fast its level turns over the level squared.
+    // theta_dot is the vertical rate over the level, phi_dot the horizontal one across the axis over the level.
     bounds.angles[1] = asin(far / level);
     bounds.rates = {change / nearest + fastest * (1 / nearest - 1 / level),
                     (level * change + far * fastest) / (nearest * nearest) +
@@ -166,12 +166,12 @@ class ChainTurns : public ChainMotion<Space, StagesInLanes<S, Real>, N> {
     }
   }
 
-  // Where coordinate a of link i stands in the user's vectors.
+  // Index of coordinate a of link i in the user's vectors.
   Eigen::Index entry(int i, std::size_t a) const { return static_cast<Eigen::Index>(a) * links() + i; }
 
   Numbers direction(int i) const { return scaled(constants_[i].inverse_length, Base::Rods::vector(rods_.along(i))); }
 
-  // Whether a link that turns by no more than `turn` from `along` on may leave the reach of its anchor.
+  // Whether a link that turns by at most `turn`, from `along` on, may leave the reach of its anchor.
   bool may_leave(const AngleAnchor<Space, Real>& anchor, int i, const Real* along, double turn) const {
     using std::sqrt;
     const Numbers off = components<D>(
@@ -180,8 +180,8 @@ class ChainTurns : public ChainMotion<Space, StagesInLanes<S, Real>, N> {
     return farthest * farthest > anchor.reach_squared();
   }
 
-  // Takes an anchor from the rod `along` through the stages to the rod `end`, x steps after the beginning; where the
-  // stages are too far apart for that, by a pole, along the polynomial through them.
+  // Takes an anchor from the rod `along` through the stages to the rod `end`, x steps after the start. Where stages are
+  // too far apart for that, near a pole, it goes along the polynomial through them.
   void follow_turn(AngleAnchor<Space, Real>& anchor, const Real* along, int i, const Real& x,
                    const Numbers& end) const {
     const Real& inverse_length = constants_[i].inverse_length;
@@ -211,7 +211,7 @@ class ChainTurns : public ChainMotion<Space, StagesInLanes<S, Real>, N> {
     anchor.follow_path(direction_at, x);
   }
 
-  // Takes all anchors to the end of the step that is solved.
+  // Takes all anchors to the end of the solved step.
   void follow_turns() {
     for (int i = 0; i < links(); ++i) {
       const Real* along = rods_.along(i);
@@ -222,7 +222,7 @@ class ChainTurns : public ChainMotion<Space, StagesInLanes<S, Real>, N> {
     }
   }
 
-  double turn_ = 0;  // the most that a link turns in the step that was solved  [rad]
+  double turn_ = 0;  // the largest turn of a link in the solved step  [rad]
   StepPrediction prediction_;
   detail::PerLink<AngleAnchor<Space, Real>, N> anchors_;
 };

@@ -12,11 +12,11 @@
 
 namespace pendula {
 
-/// The tangent space at one state of a chain, between the coordinates that steps are differentiated in
-/// (chain_tangent.hpp) and those of users: δq, δv of angles and their rates, (2 dof·n), δq first, each ordered as q is.
-/// In space the latter fail where sin θ = 0.
+/// Converts tangents at one state of a chain between the coordinates of derivatives of steps (chain_tangent.hpp) and
+/// those of users: δq, δv of angles and their rates, (2 dof·n), δq first, each ordered as q is. In space the latter
+/// fail where sin θ = 0.
 ///
-/// `parameters`, where given, are what varies beside the state, as many columns, ordered as in chain_tangent.hpp.
+/// `parameters`, where given, are variations of the parameters, as many columns, ordered as in chain_tangent.hpp.
 template <class Space, class Real = double>
 class ChainVariation {
  public:
@@ -48,13 +48,13 @@ class ChainVariation {
     }
   }
 
-  /// What angles and rates are varied by, (2 dof·n x any), as tangents.
+  /// Converts variations of angles and rates, (2 dof·n x any), to tangents.
   void tangents(const Directions<Real>& rates, Directions<Real>& tangents) { find_tangents(rates, tangents, nullptr); }
   void tangents(const Directions<Real>& rates, Directions<Real>& tangents, const Directions<Real>& parameters) {
     find_tangents(rates, tangents, parameters.data());
   }
 
-  /// The way back.
+  /// Converts tangents to variations of angles and rates.
   void rates(const Directions<Real>& tangents, Directions<Real>& rates) { find_rates(tangents, rates, nullptr); }
   void rates(const Directions<Real>& tangents, Directions<Real>& rates, const Directions<Real>& parameters) {
     find_rates(tangents, rates, parameters.data());
@@ -74,8 +74,8 @@ class ChainVariation {
     Angles v;
     Numbers u, u_dot, bob, momentum;
     RodFrame<Space, Real> frame;
-    // Of one direction.
-    Numbers turned, forced;  // δu; m δw on the way to tangents, what M δξ̇ is on the way back
+    // For the direction at hand:
+    Numbers turned, forced;  // δu; m δw on the way to tangents, M δξ̇ on the way back
   };
 
   template <class Number>
@@ -148,7 +148,7 @@ class ChainVariation {
     }
   }
 
-  // M δξ̇ = δy − δM ξ̇ + κ ξ, κ what keeps ξ·ξ̇ = 0.
+  // Solves M δξ̇ = δy − δM ξ̇ + κ ξ, with κ such that ξ·ξ̇ stays 0.
   void find_rates(Given tangents, Found rates, Given parameters) {
     Numbers forced{};
     for (std::size_t i = n(); i-- > 0;) {
@@ -179,7 +179,7 @@ class ChainVariation {
     }
   }
 
-  // Multipliers inward, and what they add to δy outward.
+  // Finds the multipliers κ inward, and adds κ ξ to δy outward.
   void keep_lengths() {
     MultiplierRow<Real> row;
     Real beyond(0);

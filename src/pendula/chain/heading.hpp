@@ -12,7 +12,7 @@ namespace pendula {
 
 namespace detail {
 
-/// x / (1 + arctangent_bend x²) is the arctangent of up to √3 to 0.005.
+/// x / (1 + arctangent_bend x²) is the arctangent of x to 0.005, for |x| up to √3.
 inline constexpr double arctangent_bend = 0.28;
 
 }  // namespace detail
@@ -53,13 +53,13 @@ Real norm(const Real& x, const Real& y) {
   return sqrt(x * x + y * y);
 }
 
-/// What is the horizontal part of a vertical unit vector, at most: rounding.
+/// The largest horizontal part of a unit vector that counts as vertical: rounding.
 template <class Real>
 Real vertical() {
   return 32 * std::numeric_limits<Real>::epsilon();
 }
 
-/// Whether a vector has no horizontal part, but for rounding.
+/// Whether a unit vector is vertical, except for rounding.
 template <class Real>
 bool is_vertical(const std::array<Real, 3>& x) {
   return norm(x[0], x[1]) < vertical<Real>();
@@ -80,7 +80,7 @@ struct SpatialAngles {
   bool opposite = false;  ///< whether sin θ is negative
 };
 
-/// Of (θ, φ) and (−θ, φ + π), which are the same direction, whichever lies nearer to `near`.
+/// (θ, φ) and (−θ, φ + π) are the same direction. Returns whichever lies nearer to `near`.
 template <class Real>
 SpatialAngles<Real> nearest_angles(const std::array<Real, 2>& q, const std::array<Real, 2>& near) {
   const Real minus_theta = -q[0], across = q[1] + half_turn<Real>();
@@ -120,7 +120,7 @@ SpatialAngles<Real> spatial_angles(const Heading<Spatial, Real>& heading, const 
 
 /// The user's θ, φ of a direction, continuous with the angles `near` of a moment before.
 ///
-/// At the pole (sin θ < 32 ulp) φ is the plane in which the link moves, or what it was if the link rests.
+/// At the pole (sin θ < 32 ulp) φ is that of the plane in which the link moves, or stays near `near` if it rests.
 template <class Real>
 std::array<Real, 2> user_coordinates(const Heading<Spatial, Real>& heading, const std::array<Real, 2>& near) {
   return detail::spatial_angles(heading, near).q;
@@ -158,7 +158,7 @@ LinkAngles<Spatial, Real> user_angles(const Heading<Spatial, Real>& heading, con
   return angles;
 }
 
-/// Direction of the rod of one member in a lane.
+/// Direction of the rod of the member in a lane.
 template <class L, std::size_t D>
 std::array<double, D> direction_of(const std::array<L, D>& rod, int lane) {
   std::array<double, D> u;
@@ -171,8 +171,8 @@ std::array<double, D> direction_of(const std::array<L, D>& rod, int lane) {
   return u;
 }
 
-/// A direction whose angles are known, from which those of later directions are counted on: full turns, and through
-/// which side of a pole, only the motion tells.
+/// A direction with known angles, from which those of later directions are followed. Full turns, and the side on which
+/// a link passes a pole, follow from the motion only.
 template <class Space, class Real = double>
 class AngleAnchor {
   using Cartesian = typename Space::Link::template Cartesian<Real>;
@@ -185,20 +185,20 @@ class AngleAnchor {
     set_reach();
   }
 
-  /// The link has moved on to u, not far from where it was last followed to.
+  /// The link has moved on to u, near to where it was last followed to.
   void follow(const Cartesian& u) {
     if (leaves(u)) move_to(u);
   }
 
-  /// Whether u is so far from where the link was last followed to that angles near its own may not be the only ones.
+  /// Whether u is so far from where the link was last followed to that the nearest angles may be wrong.
   bool leaves(const Cartesian& u) const {
     Real squared(0);
     for (std::size_t k = 0; k < u.size(); ++k) squared += (u[k] - u_[k]) * (u[k] - u_[k]);
     return squared > reach_squared_;
   }
 
-  /// The link has moved on through these directions, component after component. False, and it is where it was, where
-  /// one is farther about the axis from the one before than that only one way there could be.
+  /// The link has moved on through these directions, component after component. Returns false, and changes nothing, if
+  /// one is so far about the axis from the one before that the way between them is ambiguous.
   template <std::size_t most>
   bool follow_through(const Real (&directions)[Space::dimension][most], std::size_t count) {
     Real x = u_[0], y = u_[1], turned(0);
@@ -223,9 +223,9 @@ class AngleAnchor {
     move_to(u);
   }
 
-  /// The link has moved along direction(share), share from 0, where the anchor holds it, to `end`: followed in parts so
-  /// short that angles near those before are the only ones. So which side of a pole it has come by, and how often, does
-  /// not depend on where steps end.
+  /// The link has moved along direction(share), with share from 0, the anchor's own direction, to `end`. It is followed
+  /// in parts so short that the nearest angles are right. So the side on which it passes a pole does not depend on
+  /// where steps end.
   template <class Direction>
   void follow_path(Direction direction, const Real& end) {
     move_to(direction(Real(0)));
@@ -243,7 +243,8 @@ class AngleAnchor {
     }
   }
 
-  /// Where it was last followed to, and how far from there, squared, angles near its own are the only ones.
+  /// Where the link was last followed to, and the squared distance from there within which the nearest angles are
+  /// right.
   const Cartesian& direction() const { return u_; }
   const Real& reach_squared() const { return reach_squared_; }
   const Angles& angles() const { return q_; }
@@ -254,7 +255,7 @@ class AngleAnchor {
   }
 
  private:
-  // Of a path: a pole that is passed within less of it is passed through.
+  // Shortest part of a path. A pole that is passed within less of it counts as passed through.
   static constexpr double shortest_part = 1.0 / (1 << 20);
 
   void move_to(const Cartesian& u) {
@@ -264,8 +265,8 @@ class AngleAnchor {
     set(u, user_coordinates(heading, q_));
   }
 
-  // Within it, angles near the anchor's are the only ones: in space a quarter of the distance from the axis, and at the
-  // pole as far as directions are all vertical.
+  // Within the reach the nearest angles are right. In space it is a quarter of the distance from the axis, and at the
+  // pole the distance within which directions count as vertical.
   void set_reach() {
     if constexpr (Space::dof == 1) {
       reach_squared_ = Real(1);

@@ -10,7 +10,7 @@
 
 namespace pendula {
 
-/// The number type of a state: of whatever has coordinates q and rates v.
+/// The number type of a state with coordinates q and rates v.
 template <class Motion>
 using NumberOf = typename std::remove_cvref_t<decltype(std::declval<const Motion&>().q)>::Scalar;
 
@@ -102,7 +102,7 @@ Real energy(const Chain<Space, N>& chain, const Motion& motion) {
   return energies(chain, motion).total();
 }
 
-/// What energies are compared to: Σ M_i |g| l_i  [J]; zero without gravity.
+/// Energy errors are relative to this: Σ M_i |g| l_i  [J]; zero without gravity.
 template <class Space, int N>
 double energy_scale(const Chain<Space, N>& chain) {
   return std::abs(chain.gravity()) * chain.mass_below().dot(chain.lengths());

@@ -13,8 +13,8 @@
 
 namespace pendula {
 
-/// What acts on the chains of several members, one in each lane, beside gravity: damping, and torques of their times.
-/// Who has none is moved as if nobody had any, to the last bit.
+/// Loads on the chains of several members, one in each lane: damping, and torques, each at its own time. A member
+/// without loads moves as if no member had any, to the last bit.
 template <class Space, int N, class L>
 class MemberLoads {
   static constexpr std::size_t components = Space::torque_components;
@@ -23,7 +23,7 @@ class MemberLoads {
   explicit MemberLoads(int links)
       : links_(links), torques_(components * static_cast<std::size_t>(links)), inputs_(torques_.rows()) {}
 
-  /// Whether any member that came has some, and who of those in the lanes has.
+  /// Whether any member so far had loads; which of those in the lanes have.
   bool any() const { return any_; }
   auto loaded() const { return loaded_ > L(0.0); }
 
@@ -69,9 +69,9 @@ class MemberLoads {
   int links_;
   bool any_ = false;
   L loaded_{0.0};
-  PackRows<width_of<L>> torques_;  // now
-  MemberInputs<L> inputs_;         // the same at any time
-  std::vector<L> drag_;            // λ_i/l_i²
+  PackRows<width_of<L>> torques_;  // at the time that was set
+  MemberInputs<L> inputs_;         // torques as functions of time
+  std::vector<L> drag_;            // damping, λ_i/l_i²
 };
 
 }  // namespace pendula

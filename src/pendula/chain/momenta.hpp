@@ -31,7 +31,7 @@ Coordinates<Space, Eigen::Dynamic> momenta(const Chain<Space>& chain, const Stat
 
 namespace detail {
 
-/// Whether φ of a link has no meaning, as far as doubles can tell: sin θ = 0.
+/// Whether φ of a link is undefined: sin θ = 0, up to rounding.
 template <class Space>
 bool at_pole(double theta) {
   constexpr double rounding = 4 * std::numeric_limits<double>::epsilon();
@@ -55,7 +55,7 @@ class LinkRates {
   using Rates = Eigen::Matrix<double, Space::dof, 1>;
 
  public:
-  /// J  l ∂û/∂q; `carried` is told behind the link, its bob's mass included, and becomes what it is before the link.
+  /// J  l ∂û/∂q. `carried` is given behind the link, with the mass of its bob, and becomes that before the link.
   LinkRates(const Lever& J, bool at_pole, const Rates& p, CarriedMomentum<Space>& carried)
       : J_(J), BJ_(carried.inertia * J), D_inverse_(decltype(D_inverse_)::Zero()) {
     const Eigen::Matrix<double, Space::dof, Space::dof> D = J.transpose() * BJ_;
@@ -66,14 +66,14 @@ class LinkRates {
     }
     constant_ = D_inverse_ * (p - J.transpose() * carried.bias);
     carried.bias += BJ_ * constant_;
-    // As a square: B − BJ D⁻¹ (BJ)ᵀ is the same, but there rounding errors grow from link to link.
+    // In the form Pᵀ B P: B − BJ D⁻¹ (BJ)ᵀ is the same, but its rounding errors grow from link to link.
     using Inertia = decltype(carried.inertia);
     const Inertia passed_on = Inertia::Identity() - J * D_inverse_ * BJ_.transpose();
     const Inertia square = passed_on.transpose() * carried.inertia * passed_on;
     carried.inertia = (square + square.transpose()) / 2;
   }
 
-  /// The rates where the bob before moves with V; V becomes the velocity of the bob of this link.
+  /// The rates if the bob before moves with V. V becomes the velocity of the bob of this link.
   Rates operator()(Vector& V) const {
     Rates rates = constant_ - D_inverse_ * (BJ_.transpose() * V);
     V += J_ * rates;

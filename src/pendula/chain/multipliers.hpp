@@ -2,15 +2,15 @@
 
 namespace pendula {
 
-/// The multipliers τ of a chain's rods, from the symmetric tridiagonal system that keeps every |ξ_i| what it is:
+/// The multipliers τ of a chain's rods, from the symmetric tridiagonal system that keeps every |ξ_i| constant:
 ///   square_i τ_i + beyond_i τ_{i+1} + beyond_{i−1} τ_{i−1} = right_i,
 ///   square_i = (1/m_i + 1/m_{i−1}) |ξ_i|²,  beyond_i = −ξ_i·ξ_{i+1}/m_i,  1/m_0 = 0.
 /// It is positive definite, so that no pivoting is needed. Rows are eliminated from the tip to the pivot of the chain;
 /// then τ_i = offset_i − coupling_i τ_{i−1} outward. Number is a number or a pack.
 template <class Number>
 struct MultiplierRow {
-  Number offset{0.0};    ///< τ_i if that of the rod before were zero
-  Number coupling{0.0};  ///< how much of that one's it takes away
+  Number offset{0.0};    ///< τ_i if τ_{i−1} were zero
+  Number coupling{0.0};  ///< τ_i = offset − coupling τ_{i−1}
 
   /// The row of the rod before this one. beyond: its coupling to this rod; before: to the rod before it.
   MultiplierRow next(const Number& square, const Number& beyond, const Number& before, const Number& right) const {

@@ -5,12 +5,12 @@
 
 namespace pendula {
 
-/// A chain as plain numbers, which is how it crosses from a program to the compiled library (library.hpp). Everything
-/// pointed at belongs to the caller.
+/// A chain as plain numbers, as it passes from a program to the compiled library (library.hpp). The memory belongs to
+/// the caller.
 struct PlainChain {
   struct Drive {
     int link;
-    double amplitude[3];  ///< as many as the space's torques have components
+    double amplitude[3];  ///< (torque components)
     double frequency, phase;
   };
 

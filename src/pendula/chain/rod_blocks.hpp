@@ -9,8 +9,8 @@
 
 namespace pendula {
 
-/// How the numbers of rods stand in memory: component after component, link after link. They are worked on a block of
-/// links at a time; in one motion a block fills whole registers. Zeros follow the last link.
+/// The numbers of rods in memory: component after component, link after link. Loops take a block of links at a time; in
+/// one motion a block fills whole registers. Zeros follow the last link.
 template <class Space, int N, class Num>
 class RodBlocks {
  public:
@@ -39,7 +39,7 @@ class RodBlocks {
     return N;
   }
 
-  /// body(k) of all numbers of a block; of several members written out.
+  /// Calls body(k) for all numbers of a block; the loop is unrolled for several members.
   template <class Body>
   [[gnu::always_inline]] static void for_numbers(Body body) {
     if constexpr (is_batch<Num>) {
@@ -50,7 +50,7 @@ class RodBlocks {
     }
   }
 
-  /// body(begin of a block of links), one after the other.
+  /// Calls body(first link) for all blocks of links.
   template <class Body>
   [[gnu::always_inline]] void for_blocks(Body body) const {
     if constexpr (block == 1) {

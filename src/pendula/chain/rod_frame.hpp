@@ -6,9 +6,9 @@
 
 namespace pendula {
 
-/// The frame that vectors across a rod of direction û are written in, one that is continuous along a motion. In the
-/// plane it is the direction in which θ grows. In space no continuous pair of directions exists everywhere: there it is
-/// the three axes of the world, less their parts along û.
+/// The frame for vectors across a rod of direction û, continuous along a motion. In the plane it is the direction in
+/// which θ grows. In space no pair of directions is continuous everywhere, so that the frame is the three axes of the
+/// world, less their parts along û.
 template <class Space, class Real = double>
 class RodFrame {
  public:
@@ -18,7 +18,7 @@ class RodFrame {
   RodFrame() = default;
   explicit RodFrame(const Vector& direction) : direction_(direction) {}
 
-  /// The vector of component a.
+  /// Frame vector a.
   Vector vector(std::size_t a) const {
     if constexpr (size == 1) {
       return {-direction_[1], direction_[0]};

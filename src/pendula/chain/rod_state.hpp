@@ -36,7 +36,7 @@ class RodState : public RodBlocks<Space, N, Num> {
   using C = ConstantOf<Num>;
   using Vector = std::array<Num, D>;
 
-  /// Number type of directions on their way between angles and rods.
+  /// Number type of directions in conversions between angles and rods.
   using Wide = std::conditional_t<is_batch<Num> || std::is_same_v<C, double> || std::is_same_v<C, float>, LongReal, C>;
 
   /// A state as a value.
@@ -55,7 +55,7 @@ class RodState : public RodBlocks<Space, N, Num> {
         rows_(count),
         rates_(count) {}
 
-  /// The mass of bob i, as 1/m.
+  /// Sets the mass of bob i, as 1/m.
   void set_mass(int i, const Twofold<C>& inverse_mass) {
     std::fill_n(inverse_mass_[i], D, inverse_mass.value);
     std::fill_n(inverse_mass_low_[i], D, inverse_mass.low);
@@ -81,7 +81,7 @@ class RodState : public RodBlocks<Space, N, Num> {
     }
   }
 
-  /// Direction of a member's link and its rate, for angles to be read from.
+  /// Direction of a member's link and its rate, from which angles follow.
   Heading<Space, Wide> heading(int member, int i, const Vector& rate) const {
     const auto number = [member](const Num& x) { return get(detail::value_of(x), member); };
     using Number = std::decay_t<decltype(number(rate[0]))>;
@@ -94,7 +94,7 @@ class RodState : public RodBlocks<Space, N, Num> {
     return heading_of(rod, low, turning);
   }
 
-  /// The same of any rod + low.
+  /// The same for any rod + low.
   template <class Number>
   static Heading<Space, Wide> heading_of(const std::array<Number, D>& rod, const std::array<Number, D>& low,
                                          const std::array<Number, D>& rate) {
@@ -120,7 +120,7 @@ class RodState : public RodBlocks<Space, N, Num> {
     }
   }
 
-  /// The rates ξ̇ of all rods, from the pivot out: visit(i, ξ̇_i, τ_i). constants[i]: LinkConstants.
+  /// Calls visit(i, ξ̇_i, τ_i) for all rods, from the pivot out. constants[i]: LinkConstants.
   template <class Constants, class Visit>
   void for_each_rate(const Constants& constants, Visit visit) const {
     eliminate(constants, [&](int i) { return -exact_product_of(i); });
@@ -129,8 +129,8 @@ class RodState : public RodBlocks<Space, N, Num> {
     });
   }
 
-  /// The rates and accelerations of all rods where only gravity acts: visit(i, ξ̇_i, ξ̈_i). ξ̈_i is made of weight and
-  /// multipliers λ as ξ̇_i is of z_i and τ; |ξ̇|² + ξ·ξ̈ = 0 determines λ.
+  /// Calls visit(i, ξ̇_i, ξ̈_i) for all rods, where only gravity acts. ξ̈_i follows from weight and multipliers λ as ξ̇_i
+  /// does from z_i and τ; |ξ̇|² + ξ·ξ̈ = 0 determines λ.
   template <class Constants, class Visit>
   void for_each_acceleration(const Constants& constants, const C& gravity, Visit visit) const {
     for_each_rate(constants, [&](int i, const Vector& rate, const Num&) { rates_[i] = rate; });
@@ -171,13 +171,13 @@ class RodState : public RodBlocks<Space, N, Num> {
   }
 
   /// Moves a block of rods from `begin` on, where `accepted` is true: ξ by h z (z without its low part) + `moved`, and
-  /// z by `pushed`. GCC heeds __restrict of parameters only.
+  /// z by `pushed`. It calls another function, because GCC heeds __restrict of parameters only.
   template <class Who>
   void advance(int begin, const C& h, const Who& accepted, const Num* moved, const Num* pushed) {
     advance(h, accepted, moved, pushed, at_.along[begin], at_.along_low[begin], at_.free[begin], at_.free_low[begin]);
   }
 
-  /// Gravity over a time h. It changes the free rate of the first rod alone, because all bobs fall alike.
+  /// Adds gravity over a time h. It changes the free rate of the first rod only, because all bobs fall alike.
   template <class Who>
   void fall(const C& h, const C& gravity, const Who& accepted) {
     Num &free = at_.free[0][D - 1], &low = at_.free_low[0][D - 1];
@@ -352,7 +352,7 @@ class RodState : public RodBlocks<Space, N, Num> {
     }
   }
 
-  // What multipliers change the rates of rods by, from the pivot out: visit(i, e_i − e_{i−1}, multiplier of rod i).
+  // Calls visit(i, e_i − e_{i−1}, multiplier of rod i) from the pivot out: the changes of rates by multipliers.
   template <class Constants, class Visit>
   void for_each_bond(const Constants& constants, Visit visit) const {
     Num multiplier = rows_[0].offset;

@@ -17,16 +17,16 @@ struct MovingRod {
   double inverse_square;
 };
 
-/// The tangent that a chain in a lane begins with: every link turned by a random angle, about a random axis in space,
-/// and turning faster by another; the same ones for all members. Its length is 1, of all rods |δξ|²/l² + |δξ̇|²/(l ω)²,
-/// ω being how fast the member swings where it begins.
+/// The initial tangent of a chain in a lane. Every link is turned by a random angle, in space about a random axis, and
+/// its rate changed by another; random numbers are the same for all members. Its length is 1: Σ |δξ|²/l² +
+/// |δξ̇|²/(l ω)² over all rods, with ω the initial rate of change of the motion.
 template <class Space>
 class RodTangent {
  public:
   static constexpr std::size_t D = Space::dimension;
   using Vector = std::array<double, D>;
 
-  /// `rod(i)` tells MovingRods; `slowest_squared`: of the rates that ω is no less than  [1/s²].
+  /// rod(i) returns a MovingRod. `slowest_squared` is a lower bound of ω²  [1/s²].
   template <class Rod>
   RodTangent(int links, double slowest_squared, Rod rod) {
     double squared = slowest_squared;

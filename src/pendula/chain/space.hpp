@@ -11,7 +11,7 @@ namespace pendula {
 struct Planar {
   using Link = kernels::PlanarLink;  ///< û(q) and its derivatives, generated
   static constexpr std::string_view name = "planar";
-  static constexpr int dof = Link::dof;                              ///< coordinates a link
+  static constexpr int dof = Link::dof;                              ///< coordinates of a link
   static constexpr int dimension = Link::dimension;                  ///< Cartesian components of a bob
   static constexpr int torque_components = Link::torque_components;  ///< numbers in the torque on one link
 };
@@ -25,7 +25,7 @@ struct Spatial {
   static constexpr int torque_components = Link::torque_components;
 };
 
-/// Number of coordinates of N links, or Eigen::Dynamic where N is.
+/// Number of coordinates of N links; Eigen::Dynamic if N is.
 template <class Space, int N>
 inline constexpr int coordinates_of = N == Eigen::Dynamic ? Eigen::Dynamic : Space::dof* N;
 

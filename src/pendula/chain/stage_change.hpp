@@ -9,13 +9,13 @@
 
 namespace pendula::detail {
 
-/// What one iteration changes the stages of a chain by, gathered link by link; S stages in the lanes of an L.
+/// The size of the change of a chain's stages in one iteration, gathered link by link; S stages in the lanes of an L.
 template <int S, class L>
 class StageChange {
   using Real = pendula::ScalarOf<L>;
 
  public:
-  /// A rod whose increments change by dU; they advance it by h b ξ̇. Returns what it turns by the change.
+  /// Adds a rod whose increments change by dU; `advance` is h b ξ̇. Returns by how much the change turns it.
   template <std::size_t D>
   L add(const std::array<L, D>& rod, const std::array<L, D>& dU, const std::array<L, D>& advance,
         const Real& inverse_square) {
@@ -27,8 +27,8 @@ class StageChange {
     return turned;
   }
 
-  /// Relative to the fastest turn; NaN if any change is no number: that reaches their sum, though not always the
-  /// largest.
+  /// The largest change relative to the fastest turn. NaN if any change is NaN: it reaches the sum, though not always
+  /// the maximum.
   double relative() const {
     if (!std::isfinite(static_cast<double>(over_stages(all_, plus)))) return std::numeric_limits<double>::quiet_NaN();
     const Real change = largest_of(largest_);
@@ -43,7 +43,8 @@ class StageChange {
  private:
   static Real plus(const Real& x, const Real& y) { return x + y; }
 
-  // Of all stages in halves: what is done first does not wait for all the others.
+  // Combines the stages pairwise, halving their number each time: so operations do not wait for each other in one long
+  // chain.
   template <class Combine>
   static Real over_stages(const L& lanes, Combine combine) {
     alignas(pack_alignment) Real values[L::size];
@@ -54,10 +55,10 @@ class StageChange {
     return values[0];
   }
 
-  L largest_{Real(0)}, scale_{Real(0)}, all_{Real(0)};  // turns of one change, of the step; all changes
+  L largest_{Real(0)}, scale_{Real(0)}, all_{Real(0)};  // largest turn by a change, in the step; sum of all changes
 };
 
-/// The link whose change is the largest, or the first whose change is no number.
+/// The link with the largest change, or the first one whose change is NaN.
 template <class Real>
 class WorstLink {
  public:

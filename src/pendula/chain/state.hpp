@@ -17,7 +17,7 @@ struct State {
   State() = default;
   State(double at, const Coordinates<Space, N, Real>& angles, const Coordinates<Space, N, Real>& rates)
       : time(at), q(angles), v(rates) {}
-  /// Of whatever has a time, coordinates and rates: what an integrator gives, say.
+  /// From any other state with a time, coordinates and rates.
   template <class Other>
   requires requires(const Other& other) {
     Coordinates<Space, N, Real>(other.q), Coordinates<Space, N, Real>(other.v), other.time;

@@ -9,7 +9,7 @@
 
 namespace pendula {
 
-/// The small matrices of ChainTangent, link by link: the stage equations, linearised and eliminated once along the
+/// The small matrices of ChainTangent, link by link, from the stage equations, linearised and eliminated once along the
 /// chain, from the tip to the pivot.
 template <class Space, int S, int N, class Real, class Arch>
 class StepMaps : private StepVariation<Space, S, N, Real, Arch> {
@@ -48,12 +48,12 @@ class StepMaps : private StepVariation<Space, S, N, Real, Arch> {
     Real own[u][1 + others], end[2 * f][1 + others];
     Real velocity[vectors][1], force[vectors][1];  // of l
     Real bob[vectors][1];                          // δg of the mass: the bob's velocity at the stages
-    Real start[D];                                 // Σ z_j up to here: not the bob's velocity, but what y is made of
+    Real start[D];                                 // Σ z_j up to here: not the bob's velocity, but y is made of it
   };
 
   explicit StepMaps(int links) : maps_(links), parameter_maps_(links), links_(links) {}
 
-  /// The derivative of the step whose stages are found and that was not accepted yet.
+  /// Computes the matrices of the step that was solved and not yet accepted.
   void linearize(const Stages& stages) {
     this->set_coefficients(stages.columns());
     positive_ = true;
@@ -94,7 +94,7 @@ class StepMaps : private StepVariation<Space, S, N, Real, Arch> {
     }
   }
 
-  // What δV and δτ of the stages do to y by the end of the step: of δV, and of what is across the residual.
+  // Derivatives of y at the end of the step with respect to δV of the stages, and to the residual, through δτ.
   struct EndMomentum {
     Real velocity[D][vectors], residual[D][vectors];  // Λ
   };
@@ -258,7 +258,7 @@ class StepMaps : private StepVariation<Space, S, N, Real, Arch> {
     }
   }
 
-  // Parameters that change nothing but the forces.
+  // Keeps the maps of parameters that change forces only.
   void keep_others(const Stages& stages, int i, const Link& link, const Block<u, vectors>& push,
                    const EndMomentum& end) {
     ParameterMaps& maps = parameter_maps_[i];

@@ -10,8 +10,8 @@
 
 namespace pendula {
 
-/// Variations of the stage equations of a chain where they are solved: what a link has there, and what changes of its
-/// start and of its parameters add to them.
+/// Variations of the stage equations of a chain at their solution: the quantities of a link there, and the terms by
+/// which changes of its start and of its parameters enter.
 template <class Space, int S, int N, class Real, class Arch>
 class StepVariation : protected ChainElimination<Space, S, N, Real, Arch> {
   using Base = ChainElimination<Space, S, N, Real, Arch>;
@@ -24,7 +24,7 @@ class StepVariation : protected ChainElimination<Space, S, N, Real, Arch> {
   using Numbers = std::array<Real, D>;
   static constexpr std::size_t torques = Space::torque_components;
 
-  // A variation of the stage equations of a link, times nothing: r at the stages; of δξ and δy at the end.
+  // A variation of the stage equations of a link: r at the stages, and direct changes of ξ and y at the end.
   struct Source {
     Vector residual = Base::zero();
     Numbers rod{}, momentum{};
@@ -38,7 +38,7 @@ class StepVariation : protected ChainElimination<Space, S, N, Real, Arch> {
     return sum;
   }
 
-  // What link i has at its stages and at both ends of the step.
+  // Quantities of link i at its stages and at both ends of the step.
   struct Link {
     Terms terms;
     Vector rod;
@@ -71,7 +71,7 @@ class StepVariation : protected ChainElimination<Space, S, N, Real, Arch> {
     link.frame_at_end = Frame(scaled(c.inverse_length, end));
   }
 
-  /// What a change x of the rod at the start does, y − c x apart unchanged.
+  /// The variation by a change x of the rod at the start, where y changes by c x only.
   static Source of_rod(const Stages& stages, int i, const Link& link, const Numbers& x) {
     const Real hanging = stages.hanging(i);
     Source source;
@@ -95,7 +95,7 @@ class StepVariation : protected ChainElimination<Space, S, N, Real, Arch> {
     return source;
   }
 
-  // A force at the stages, times h b.
+  // Adds a force at the stages, times h b.
   static void add_force(const Stages& stages, const Vector& force, Source& source) {
     for (std::size_t d = 0; d < D; ++d) {
       source.residual[d] = source.residual[d] + stages.columns().integral(force[d]);
@@ -110,12 +110,12 @@ class StepVariation : protected ChainElimination<Space, S, N, Real, Arch> {
     return source;
   }
 
-  // h b times the rod.
+  // −tension times h b times the rod.
   static Vector pull_of(const Stages& stages, const Link& link, const Real& tension) {
     return components<D>([&](std::size_t d) { return stages.columns().hb() * L(-tension) * link.rod[d]; });
   }
 
-  /// What the length changes where angles and their momenta stay: ξ = l û, y = μ/l + c ξ, and what loads depend on.
+  /// The variation by a change of the length with constant angles and momenta: of ξ = l û, y = μ/l + c ξ, and of loads.
   static Source of_length(const Stages& stages, int i, const Link& link) {
     const LinkConstants<Real>& c = stages.constants(i);
     Source source = of_rod(stages, i, link, link.direction);

@@ -15,7 +15,7 @@
 
 namespace pendula {
 
-/// Brings chains into the lanes of a stepper and reads them there, as angles; counts full turns on the way.
+/// Puts chains into the lanes of a stepper, reads their angles there, and counts full turns along their motions.
 template <class Stepper>
 class ChainSeats {
   using Space = typename Stepper::SpaceType;
@@ -49,7 +49,7 @@ class ChainSeats {
   /// Counts the turns of members that have taken a step; `far` are those that may have turned far and come back.
   void follow(const Mask& which, const Mask& far) { turns_.follow(which, far, stepper_.chain(), sight_); }
 
-  /// Where the member in a lane is.
+  /// Reads the state of the member in a lane.
   void read(int lane, double* q, double* v) {
     auto& chain = stepper_.chain();
     chain.find_rates();

@@ -18,9 +18,9 @@ struct Chunk {
   std::int64_t size() const { return last - first; }
 };
 
-/// Calls work(chunk) for every chunk that `claim` hands out, until it has none, on `threads` threads, of which this is
-/// one; on fewer, where the system gives no more. `claim` and `work` are called by several at once. What either throws
-/// ends the others after their chunk, and is thrown here; the first one counts.
+/// Calls work(chunk) for every chunk that `claim` returns, until it returns none, on `threads` threads; this one counts
+/// as one of them, and fewer are used where the system gives no more. Several threads call `claim` and `work` at once.
+/// If one throws, the others end after their chunk, and the first exception is thrown here.
 inline void for_each_chunk(int threads, const std::function<std::optional<Chunk>()>& claim,
                            const std::function<void(const Chunk&)>& work) {
   std::mutex guard;
@@ -46,7 +46,7 @@ inline void for_each_chunk(int threads, const std::function<std::optional<Chunk>
     try {
       for (int k = 1; k < threads; ++k) others.emplace_back(take_all);
     } catch (const std::system_error&) {
-      // those that there are do all
+      // the threads that exist do all the work
     }
     take_all();
   }

@@ -14,28 +14,28 @@
 
 namespace pendula {
 
-/// Motions of one system side by side, each with inputs of its own, which are held during a move. They go in lanes
-/// where there are some for the system and the options (lane_kind), else one by one. The result for a motion depends on
-/// that motion alone, to the last bit.
+/// Motions of one system side by side, each with inputs of its own, which are held during a move. They go in lanes if
+/// the system and the options allow it (lane_kind), else one by one. The result for a motion depends on that motion
+/// alone, to the last bit.
 class HeldMembers {
  public:
-  /// `duration` of each move  [s]. `options` are those of a motion alone; in lanes, steps of another kind may take
-  /// their place (quickest_in_lanes). Throws std::invalid_argument for a subject with drives, or pieces, and for
-  /// options that make no sense.
+  /// `duration` of each move  [s]. `options` are those of a motion run alone; in lanes another method may replace
+  /// theirs (quickest_in_lanes). Throws std::invalid_argument for a subject with drives, or with functions of several
+  /// pieces, and for options that make no sense.
   HeldMembers(std::shared_ptr<const Subject> subject, std::size_t coordinates, const RunOptions& options,
               double duration);
 
   std::size_t coordinates() const { return coordinates_; }
   std::size_t inputs() const { return inputs_; }
 
-  /// What became of the members: how the first failed, and which it was; ok where none did.
+  /// The result of a move: how the first member failed, and which it was; ok if none failed.
   struct MoveResult {
     Outcome outcome;
     std::size_t member = 0;
   };
 
   /// Moves each of `states`, (members x 2 coordinates): coordinates, then rates, over the duration with its row of
-  /// `inputs`, (members x inputs). If one fails, or `stop` stops them, states are where they began. Throws
+  /// `inputs`, (members x inputs). If a member fails, or `stop` ends the move, all states are unchanged. Throws
   /// std::invalid_argument on sizes that do not fit.
   MoveResult move(std::span<const double> inputs, std::span<double> states, const std::function<bool()>& stop);
 
@@ -48,7 +48,7 @@ class HeldMembers {
   RunOptions options_, in_lanes_;
   double duration_;
   std::size_t coordinates_, inputs_;
-  std::optional<LaneKind> kind_;  // none: no lanes
+  std::optional<LaneKind> kind_;  // nullopt: no lanes
   std::vector<double> ends_;
 };
 

@@ -19,7 +19,7 @@ class LaneExponent {
  public:
   explicit LaneExponent(double duration) : duration_(duration) {}
 
-  /// In a step to `time` since the start.
+  /// Takes the growth in a step to `time` since the start.
   void follow(double growth, double time) {
     tangent_.follow(growth, time_, time);
     time_ = time;
@@ -63,7 +63,7 @@ class LaneExponents : private MemberWatch {
     for (const RunSetup* setup : setups) exponents_.emplace_back(setup->duration);
   }
 
-  /// The exponent of each run; none where lanes could not move it. Empty if it was stopped.
+  /// The exponent of each run; nullopt if lanes could not move it. The vector is empty if `stop` ended the work.
   std::vector<std::optional<LyapunovSpectrum>> go() {
     if (!members_.move_with_tangents(options_, *this)) return {};
     std::vector<std::optional<LyapunovSpectrum>> found(setups_.size());
@@ -74,7 +74,7 @@ class LaneExponents : private MemberWatch {
   }
 
  private:
-  // As in LaneRuns, a substituted method must keep the energy of a motion that conserves it.
+  // As in LaneRuns, a substituted method must conserve the energy where the motion does.
   bool is_good(std::size_t k) const {
     const RunSetup& setup = *setups_[k];
     const Subject& subject = *setup.subject;

@@ -30,7 +30,7 @@ bool name_chain(const RunSetup& setup, const RunOptions& options, bool with_tang
   }
   if (!is_explicit(options.method)) {
     if (options.solver == Solver::dense) return false;
-    // With constant steps that do not resolve a chain, fixed points hardly converge. Chosen steps become shorter
+    // With constant steps that do not resolve a chain, fixed points hardly converge. Adaptive steps become shorter
     // instead.
     if (!is_adaptive(options) && !ChainLinks<Space>(chain->chain()).resolves(options.step)) return false;
   }
@@ -42,8 +42,8 @@ bool name_kernel(const RunSetup& setup, const RunOptions& options, bool with_tan
   const bool by_series = options.method == Method::taylor;
   if (by_series && system->table().of_1.series_next == nullptr) return false;
   if (!is_explicit(options.method) && system->info().depends_on_time) return false;
-  if (!system->switches().empty()) return false;  // each member ends its steps elsewhere
-  if (system->may_be_narrow()) return false;      // lanes do not look between their stages
+  if (!system->switches().empty()) return false;  // each member would end its steps at its own switchings
+  if (system->may_be_narrow()) return false;      // steps in lanes do not check forces between their stages
   kind.kernel = &system->table();
   return true;
 }

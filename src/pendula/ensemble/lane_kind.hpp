@@ -13,7 +13,7 @@ namespace pendula {
 /// What runs must have in common to go in lanes together.
 struct LaneKind {
   int dimension = 0, links = 0;         // of chains
-  const SystemTable* kernel = nullptr;  // of others, and of chains that move by its series
+  const SystemTable* kernel = nullptr;  // of other systems, and of chains that move by its series
   int stages = 0;
   Method method = Method::gauss;
   Iteration iteration = Iteration::automatic;
@@ -25,11 +25,12 @@ struct LaneKind {
   bool operator==(const LaneKind& other) const { return tied() == other.tied(); }
 };
 
-/// The kind of a run that goes in lanes with `options`; nothing for a run that does not. By Gauss steps, with the
-/// numbers of stages that lanes are compiled for, go chains with the chain solver, if constant steps resolve them, and
-/// systems of generated kernels that depend on time by inputs only; by Taylor series, systems; by fehlberg78, all
-/// chains and systems. Systems whose forces may be narrow by functions other than powers and logarithms do not go in
-/// lanes.
+/// The kind of a run that goes in lanes with `options`; nullopt for any other run. In lanes go
+///   by Gauss steps     chains with the chain solver, if constant steps resolve them, and systems that depend on time
+///                      through inputs only; with the numbers of stages that lanes are compiled for
+///   by Taylor series   systems
+///   by fehlberg78      all chains and systems
+/// but no systems whose forces may be narrow by functions other than powers and logarithms.
 std::optional<LaneKind> lane_kind(const RunSetup& setup, const RunOptions& options);
 std::optional<LaneKind> lane_kind(const RunSetup& setup);
 /// The same where each member has a tangent.
@@ -37,8 +38,8 @@ std::optional<LaneKind> tangent_lane_kind(const RunSetup& setup, const RunOption
 
 namespace detail {
 
-/// Whether a substituted method has to be tried, as for systems and loaded chains: it must keep the energy of a motion
-/// that conserves it, and finish soon.
+/// Whether a substituted method has to prove itself, as for systems and loaded chains: it must conserve the energy
+/// where the motion does, and finish soon.
 bool has_to_be_tried(const Subject& subject);
 
 }  // namespace detail

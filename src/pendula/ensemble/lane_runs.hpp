@@ -30,7 +30,7 @@ namespace pendula {
 
 namespace detail {
 
-/// What energy errors of a member are divided by  [J]; `sum`: the largest |T| + |U| seen on the way.
+/// The scale of the energy errors of a member  [J]; `sum`: the largest |T| + |U| along its motion.
 inline double energy_scale(const Subject& subject, const Observation& before, const Observation& after, double sum) {
   if (subject.energy_scale()) return compared_with(subject.energy_scale(), before.energy);
   const auto sizes = [](const Observation& seen) { return std::abs(seen.kinetic) + std::abs(seen.potential()); };
@@ -61,7 +61,7 @@ class PlainChains : public MemberEnds {
     return library<LaneMovers<Space>>().with_tangents(options)(options, 0, members_, all(), watch);
   }
 
-  /// What solves the stage equations.
+  /// The solver and the iteration of the stage equations.
   Description description() const { return {"chain", "fixed-point", ""}; }
 
  private:
@@ -129,7 +129,7 @@ class LaneRuns : private MemberWatch {
     takes_too_long_.resize(setups.size());
   }
 
-  /// The report of each run; none where lanes could not move it, by steps of its own choice or at all.
+  /// The report of each run; nullopt if lanes could not move it.
   std::vector<std::optional<RunReport>> go() {
     reports_.assign(setups_.size(), {});
     move();
@@ -155,7 +155,7 @@ class LaneRuns : private MemberWatch {
     }
   }
 
-  /// Fills the report as Run would; false if the member did not come to its end.
+  /// Fills the report as Run would; false if the member did not reach its end.
   bool finish(std::size_t k) {
     const RunSetup& setup = *setups_[k];
     const MemberEnd& end = members_.end(k);
@@ -280,8 +280,8 @@ class LaneRuns : private MemberWatch {
   std::vector<EventWatch> watches_;
   Members members_;
   std::vector<RunReport> reports_;
-  // Steps that a substituted method may take: few where nothing checks them, more where the energy does. After
-  // tried_steps they are extrapolated for the first time.
+  // Most steps of a substituted method: few where nothing checks it, more where the energy does. Their number is
+  // extrapolated for the first time after tried_steps.
   static constexpr int most_unchecked_steps = 2000, most_steps = 20000, tried_steps = 200;
   static constexpr std::int64_t no_limit = std::numeric_limits<std::int64_t>::max();
 
@@ -292,7 +292,7 @@ class LaneRuns : private MemberWatch {
 
 namespace detail {
 
-/// Numbers of the runs of each kind.
+/// Indices of the runs of each kind.
 using RunsByKind = std::map<LaneKind, std::vector<std::size_t>>;
 
 inline std::vector<const RunSetup*> chosen(std::span<const RunSetup> setups, const std::vector<std::size_t>& numbers) {

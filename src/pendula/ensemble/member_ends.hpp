@@ -9,7 +9,7 @@
 
 namespace pendula {
 
-/// The ends of members, with the storage that they point to.
+/// The ends of members, with the memory that they point to.
 class MemberEnds {
  public:
   MemberEnds(Eigen::Index coordinates, std::size_t count)

@@ -24,18 +24,18 @@ namespace pendula {
 
 /// How members are moved.
 struct QueueOptions {
-  double step = 0;                ///< s; 0: of each member's own choice, by tolerance
+  double step = 0;                ///< s; 0: adaptive steps of each member, by the tolerance
   double tolerance = 1e-9;        ///< of the motion, relative to its size, as RunOptions::tolerance
-  double enough = 0;              ///< MembersStepperOptions; 0: round-off; with chosen steps, a part of the tolerance
-  std::int64_t energy_every = 0;  ///< steps from one look at the energy to the next; 0: it is not looked at
+  double enough = 0;              ///< MembersStepperOptions; 0: round-off, or a part of the tolerance of adaptive steps
+  std::int64_t energy_every = 0;  ///< steps between samples of the energy; 0: none
 };
 
 /// Moves the members of an ensemble to their ends by steps of a MembersStepper or ExplicitSteps, as many at once as a
-/// register has lanes; `Seats` brings them into lanes and out of them. A lane whose member has come to its end takes
-/// the next one: none is idle until the last have begun. What a member does depends on nothing but itself, to the last
-/// bit.
+/// register has lanes; `Seats` puts them into lanes and reads them. A lane whose member has reached its end takes the
+/// next one, so that none is idle until the last have begun. The motion of a member depends on that member alone, to
+/// the last bit.
 ///
-/// A member that a fixed point cannot move ends where it is and says so; the others go on.
+/// A member that a fixed point cannot move ends where it is, with a status; the others go on.
 template <class Stepper, class Seats = ChainSeats<Stepper>>
 class MemberQueue {
  public:
@@ -45,8 +45,8 @@ class MemberQueue {
   using Subject = typename Stepper::Subject;
   static constexpr int lanes = L::size, stages = Stepper::stages;
 
-  /// `subject`: what members share, of chains their number of links, of systems the functions of their kernel. Throws
-  /// std::invalid_argument where an explicit method is not told its step.
+  /// `subject` is what members share: the number of links of chains, the table of the kernel of systems. Throws
+  /// std::invalid_argument if a method without error estimate is given no step.
   MemberQueue(Subject subject, const QueueOptions& options)
       : options_(options),
         stepper_(subject, stepper_options(options)),
@@ -78,15 +78,15 @@ class MemberQueue {
     return true;
   }
 
-  /// Fixed-point iterations that were made, of all lanes at once.
+  /// Number of fixed-point iterations, each of all lanes at once.
   std::int64_t iterations() const requires(Stepper::is_implicit) { return stepper_.iterations(); }
 
  private:
   // The scale of the energy of a system is known only after the run: the largest |T| + |U|.
   static constexpr bool sums_energies = requires(const Stepper& stepper) { stepper.energy_sum(); };
   static constexpr bool may_be_stiff = requires(const Stepper& stepper) { stepper.chain().may_be_stiff(); };
-  static constexpr double first_unsolved = 10, most_unsolved = 0.1;  // failed steps: in all, and for each accepted step
-  static constexpr double smallest_step = 1e-10;                     // of the time that is left
+  static constexpr double first_unsolved = 10, most_unsolved = 0.1;  // failed steps: in all, and per accepted step
+  static constexpr double smallest_step = 1e-10;                     // relative to the time that is left
 
   // An iteration error of a ten-thousandth of the tolerance does not show beside the error of a step.
   static typename Stepper::Options stepper_options(const QueueOptions& options) {
@@ -138,7 +138,7 @@ class MemberQueue {
     steps_ = steps_ + select(good, L(1.0), L(0.0));
     attempts_ = select(good, L(0.0), attempts_);
     const Mask is_finished = show(good, begin, is_cut);
-    if (options_.energy_every > 0) watch_energy(good & !is_finished);  // a watch finishes a member within its step
+    if (options_.energy_every > 0) watch_energy(good & !is_finished);  // finished members ended within this step
     if (chooses()) controller_.move_on(good, h, stepper_);
     const Mask bad = running() & !good;
     if (xsimd::any(bad)) reject(bad, found & !wrong, h, remaining);
@@ -154,7 +154,8 @@ class MemberQueue {
     seats_.follow(good, good & !good);
   }
 
-  // Stages whose energy does not balance solve the equations, but are not those of the motion.
+  // Accepts good members, but of the doubtful ones only those whose energy balances: stages of the others solve the
+  // equations, but are not those of the motion. Returns these others.
   Mask accept_doubtful(const Mask& good, const Mask& doubtful) {
     auto& chain = stepper_.chain();
     const L due = chain.energy_due();
@@ -170,7 +171,7 @@ class MemberQueue {
     return wrong;
   }
 
-  // Shows the step to the watch; gives the members that it has finished.
+  // Shows the step to the watch. Returns the members that the watch has finished.
   Mask show(const Mask& good, const L& begin, const Mask& is_cut) {
     if (!view_ || !xsimd::any(good)) return good & !good;
     view_->set(good, begin, select(is_cut, end_, time_.value));
@@ -205,8 +206,8 @@ class MemberQueue {
     if (xsimd::any(lost)) retire(lost, Status::not_converged);
   }
 
-  // Members whose fixed points have failed so often that convergence limits their steps, not the error: Newton's
-  // iteration is faster.
+  // Members whose fixed points have failed so often that convergence limits their steps, not the error. Run alone, by
+  // Newton's iteration, they take less time.
   Mask is_stiff([[maybe_unused]] const Mask& unsolved) {
     if constexpr (may_be_stiff) {
       const Mask counted = unsolved & stepper_.chain().may_be_stiff();
@@ -292,27 +293,27 @@ class MemberQueue {
   L steps_{0.0}, rejected_{0.0}, unsolved_{0.0}, attempts_{0.0};
   L energy_{0.0}, energy_error_{0.0}, energy_sum_{0.0}, since_look_{0.0};
   MemberWatch* watch_ = nullptr;
-  bool keeps_begin_ = false;  // of the last step, for who looks into it
+  bool keeps_begin_ = false;  // whether the start of the last step is kept, for states within it
   std::optional<typename Seats::View> view_;
 };
 
-/// By Gauss steps of S stages, of chains of N links.
+/// Gauss steps of S stages, of chains of N links.
 template <class Space, int S, int N = Eigen::Dynamic, class Register = MemberRegister>
 using GaussLanes = MemberQueue<MembersStepper<ChainMembers<Space, S, N, Register>>>;
 
-/// The same with a tangent of each member, whose growth a watch is told of.
+/// The same with a tangent of each member, whose growth the watch gets.
 template <class Space, int S, int N = Eigen::Dynamic, class Register = MemberRegister>
 using GaussTangentLanes = MemberQueue<MembersStepper<ChainMembers<Space, S, N, Register, true>>>;
 
-/// By explicit steps.
+/// Explicit steps of chains.
 template <class Space, class Method, int N = Eigen::Dynamic, class Register = MemberRegister>
 using ExplicitLanes = MemberQueue<ExplicitSteps<ChainAccelerations<Space, N, LanePack<Register>>, Method>>;
 
-/// By explicit steps with a tangent of each member.
+/// The same with a tangent of each member.
 template <class Space, class Method, int N = Eigen::Dynamic, class Register = MemberRegister>
 using TangentLanes = MemberQueue<ExplicitSteps<ChainAccelerations<Space, N, LanePack<Register>, true>, Method>>;
 
-/// By Taylor series, of chains without loads.
+/// Taylor series of chains without loads.
 template <class Space, int N = Eigen::Dynamic, class Register = MemberRegister>
 using TaylorLanes = MemberQueue<TaylorSteps<ChainAccelerations<Space, N, LanePack<Register>>>>;
 
@@ -320,26 +321,26 @@ using TaylorLanes = MemberQueue<TaylorSteps<ChainAccelerations<Space, N, LanePac
 template <class Space, int N = Eigen::Dynamic, class Register = MemberRegister>
 using TaylorTangentLanes = MemberQueue<TaylorSteps<ChainAccelerations<Space, N, LanePack<Register>, true>>>;
 
-/// By explicit steps, of systems of one kernel (MemberSystems).
+/// Explicit steps of systems of one kernel (MemberSystems).
 template <class Method, class Register = MemberRegister>
 using SystemLanes = MemberQueue<ExplicitSteps<SystemAccelerations<LanePack<Register>>, Method>,
                                 SystemSeats<ExplicitSteps<SystemAccelerations<LanePack<Register>>, Method>>>;
 
-/// The same by Taylor series.
+/// Taylor series of systems.
 template <class Register = MemberRegister>
 using SystemSeriesLanes = MemberQueue<SeriesSteps<LanePack<Register>>, SystemSeats<SeriesSteps<LanePack<Register>>>>;
 
-/// The same by Gauss steps of S stages.
+/// Gauss steps of S stages, of systems.
 template <int S, class Register = MemberRegister>
 using GaussSystemLanes =
     MemberQueue<MembersStepper<SystemMembers<S, Register>>, SystemSeats<MembersStepper<SystemMembers<S, Register>>>>;
 
-/// By Gauss steps with a tangent of each member.
+/// The same with a tangent of each member.
 template <int S, class Register = MemberRegister>
 using GaussSystemTangentLanes = MemberQueue<MembersStepper<SystemMembers<S, Register, true>>,
                                             SystemSeats<MembersStepper<SystemMembers<S, Register, true>>>>;
 
-/// By explicit steps with a tangent of each member.
+/// Explicit steps of systems, with a tangent of each member.
 template <class Method, class Register = MemberRegister>
 using SystemTangentLanes =
     MemberQueue<ExplicitSteps<SystemAccelerations<LanePack<Register>, true>, Method>,

@@ -64,7 +64,7 @@ class MemberView : public MemberSteps {
     look_now();
     const L begin = L::load(begin_);
     if (!sight_.at_full_order(lane, begin, L::load(end_) - begin, share, parts_)) return false;
-    View& view = views_.back();  // the one that was filled last
+    View& view = views_.back();  // the view that was filled last
     view.share = nothing;
     write(share, view);
     view.read(lane, q, v);
@@ -127,7 +127,7 @@ class MemberView : public MemberSteps {
     return view;
   }
 
-  // Coordinates of `parts_`, which were found at a share of the step.
+  // Writes the coordinates of `parts_`, which are those at `share` of the step.
   void write(double share, View& view) {
     for (std::size_t i = 0; i < parts_.size(); ++i) {
       const auto& [place, rate] = parts_[i];
@@ -179,8 +179,8 @@ class MemberView : public MemberSteps {
     }
   }
 
-  // Angles near those of u, the direction of a link at a share of its step: the angles at the end of the step or, where
-  // the link may have come by a pole, those found by following it back from there.
+  // Angles near those of u, the direction of a link at a share of its step: the angles at the end of the step or, if
+  // the link may have passed a pole, those found by following it back from there.
   std::array<double, 2> angles_near(int lane, std::size_t i, const std::array<double, D>& u,
                                     double share) requires(D == 3) {
     const auto direction_at = [&](double back) {

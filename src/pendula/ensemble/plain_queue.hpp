@@ -28,8 +28,8 @@ bool move_by(typename Queue::Subject subject, const RunOptions& options, std::in
   return queue.run(members, ends);
 }
 
-/// Moves::of<stages>() of Gauss steps, Moves::by<Method>() of an explicit method, or Moves::by_series(); nullptr for
-/// what lanes were not compiled for.
+/// Moves::of<stages>() for Gauss steps, Moves::by<Method>() for an explicit method, or Moves::by_series(); nullptr if
+/// lanes are not compiled for the options.
 template <class Moves>
 auto lanes_of(const RunOptions& options) -> decltype(Moves::template of<4>()) {
   switch (options.method) {

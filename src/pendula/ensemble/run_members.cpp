@@ -27,7 +27,7 @@ int links_of(const Subject& subject) {
   return found == nullptr ? 0 : found->chain().links();
 }
 
-/// About how fast a chain in one space swings  [1/s]; nothing for other subjects.
+/// Roughly the frequency of a chain in one space  [1/s]; nullopt for other subjects.
 template <class Space>
 std::optional<double> natural_pace_in(const Subject& subject) {
   const auto* const found = dynamic_cast<const ChainSubject<Space>*>(&subject);
@@ -36,14 +36,14 @@ std::optional<double> natural_pace_in(const Subject& subject) {
   return chain.links() * std::sqrt(slowest_pace_factor * std::abs(chain.gravity()) / chain.lengths().sum());
 }
 
-/// About how fast a chain swings  [1/s]; infinity for other subjects.
+/// Roughly the frequency of a chain  [1/s]; infinity for other subjects.
 double natural_pace(const Subject& subject) {
   const std::optional<double> planar = natural_pace_in<Planar>(subject);
   return planar ? *planar : natural_pace_in<Spatial>(subject).value_or(std::numeric_limits<double>::infinity());
 }
 
-// The length of a run in swings, or in turns where it starts fast. Up to short_run an explicit method loses no more
-// energy than the motion's error.
+// The length of a run in swings, or in turns if it starts fast. Up to short_run the energy that an explicit method
+// loses stays below the error of the motion.
 constexpr double short_run = 100;
 double run_length(const RunSetup& setup) {
   return setup.duration * std::hypot(natural_pace(*setup.subject), setup.start.v.cwiseAbs().maxCoeff());
@@ -63,10 +63,10 @@ bool goes_by_series(const RunSetup& setup) {
   return links <= most_links && std::isfinite(natural_pace(subject)) && !subject.loaded();
 }
 
-// Tolerance of explicit steps with tangents: of a smaller one rounding leaves nothing.
+// The smallest tolerance of explicit steps with tangents: below it, rounding is larger.
 constexpr double finest_with_tangents = 1e-13;
 
-// The tolerance of a step (step_tolerance). It is the same for runs of about the same length, which so go in lanes
+// The tolerance of a step (step_tolerance). Runs of about the same length have the same one, so that they go in lanes
 // together.
 double tolerance_of_steps(const RunSetup& setup, double finest) {
   const double length = run_length(setup);
@@ -112,15 +112,15 @@ RunOptions options_asked_for(const RunSetup& setup) {
   return setup.options;
 }
 
-// The lanes in which a run was tried last, and its report if they moved it.
+// The kind of lanes in which a run was tried last, and its report if it succeeded.
 struct Tried {
   std::optional<LaneKind> kind;
   std::optional<RunReport> report;
   std::optional<Track> track;  // of a run that gets a second look
 };
 
-// Tries the runs without a report in lanes, if these differ from those of the last try. Runs with a track go in lanes
-// of their own, since to look at every step takes time.
+// Tries the runs without a report in lanes, if their kind differs from that of the last try. Runs with a track go in
+// lanes of their own, since a track takes time in every step.
 void try_in_lanes(std::span<const RunSetup> setups, RunOptions (*options_of)(const RunSetup&),
                   const std::function<bool()>& stop, std::vector<Tried>& tried) {
   RunsByKind followed, others;

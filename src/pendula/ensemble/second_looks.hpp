@@ -21,7 +21,7 @@
 
 namespace pendula::detail {
 
-/// A track for a run in lanes: of many at once, so at most 256 kB.
+/// A track for a run in lanes, of at most 256 kB, since there are many at once.
 inline Track lane_track() {
   return Track(Track::apart / 2, std::size_t{1} << 15).by_dense_output();
 }
@@ -41,13 +41,13 @@ inline RunOptions in_lanes(RunOptions options, const RunOptions& run) {
   return options;
 }
 
-/// A warning if another run finds other events, or at other times.
+/// A warning if another run finds other events, or the same ones at other times.
 inline Warning of_events(const RunSetup& setup, const SecondLook& look, const RunReport& report,
                          const RunReport& other) {
   for (std::size_t k = 0; k < setup.events.size(); ++k) {
     const EventTally &one = report.events[k], &another = other.events[k];
     const double off = std::abs(one.first - another.first) * look.trusted;
-    const bool is_early = !(off > visible * (one.first - setup.start.time));  // or never
+    const bool is_early = !(off > visible * (one.first - setup.start.time));  // true, too, if it never happened
     if (one.count == another.count && is_early) continue;
     const std::string what = "event " + setup.events[k].name + " happens ";
     if (one.count != another.count) {
@@ -59,8 +59,8 @@ inline Warning of_events(const RunSetup& setup, const SecondLook& look, const Ru
   return {};
 }
 
-/// Tracks of runs in lanes are dense output, whose errors are larger than those of steps: they only tell whether the
-/// motion has gone elsewhere on the way. The ends are compared exactly.
+/// A warning by the distance from another run. Tracks of runs in lanes are dense output, whose errors are larger than
+/// those of steps: they only show whether the motions have parted on the way. The ends are compared exactly.
 inline Warning of_other(const Judged& member, const SecondLook& look, const RunReport& other, const Track& track) {
   static constexpr double elsewhere = 0.5;
   const Separation parted(*member.setup.subject, member.track, track);
@@ -69,7 +69,7 @@ inline Warning of_other(const Judged& member, const SecondLook& look, const RunR
   return warning ? warning : of_events(member.setup, look, member.report, other);
 }
 
-/// If no other run goes in lanes: the member is run alone, with a second look, and its end is compared.
+/// A warning where no other run goes in lanes: the member is run alone, with a second look, and its end is compared.
 inline Warning of_run_alone(const Judged& member, const std::function<bool()>& stop) {
   const RunSetup& setup = member.setup;
   const RunReport alone = Run(setup).go(stop);
@@ -83,7 +83,8 @@ inline Warning of_run_alone(const Judged& member, const std::function<bool()>& s
   return of_events(setup, {setup.options, "alone, not in lanes,", 1, 1}, member.report, alone);
 }
 
-/// Looks at members again, each by the run that choose(member) gives; if it gives none, the warning stays as it is.
+/// Looks at members again, each by the run that choose(member) returns; if it returns none, the warning does not
+/// change.
 template <class Choose>
 void look_by(std::span<Judged* const> members, Choose choose, const std::function<bool()>& stop) {
   std::vector<Judged*> looked;
@@ -91,7 +92,7 @@ void look_by(std::span<Judged* const> members, Choose choose, const std::functio
   std::vector<RunSetup> setups;
   std::vector<Track> tracks;
   RunsByKind kinds;
-  std::vector<std::size_t> others;  // that do not go in lanes
+  std::vector<std::size_t> others;  // runs that do not go in lanes
   for (Judged* const member : members) {
     const RunOptions& run = member->report.options;
     std::optional<SecondLook> look = choose(*member);
@@ -131,7 +132,8 @@ void look_by(std::span<Judged* const> members, Choose choose, const std::functio
   }
 }
 
-/// As Run does: first by a coarser run, which takes less time; if that doubts a member, by a finer one.
+/// Looks at members again as Run does: by a coarser run, which takes less time, and if that leaves a warning, by a
+/// finer one.
 inline void look_again(std::vector<Judged>& members, const std::function<bool()>& stop) {
   std::vector<Judged*> left;
   left.reserve(members.size());

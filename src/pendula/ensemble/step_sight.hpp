@@ -8,8 +8,8 @@
 
 namespace pendula {
 
-/// States within the last steps of members in lanes, for any stepper: rods of all links and their rates, or coordinates
-/// of systems (D = 1) and theirs. So what looks at steps is compiled once, not for every stepper.
+/// States within the last steps of members in lanes, for any stepper: rods and their rates, or coordinates of systems
+/// (D = 1) and their rates. Code that looks into steps is so compiled once, not for every stepper.
 template <class L, std::size_t D>
 class StepSight {
  public:
@@ -21,14 +21,14 @@ class StepSight {
   virtual ~StepSight() = default;
 
   virtual int count() const = 0;
-  /// Where the members are: at the end of the step.
+  /// The states at the end of the step.
   virtual void now(Parts& parts) = 0;
-  /// Where they were when a share of the step was done, 0 to 1, by the polynomial through the step.
+  /// The states when a share of the step was done, 0 to 1, by the polynomial through the step.
   virtual void at(double share, Parts& parts) = 0;
-  /// The same of one member, at the full order of the method, in a step from `begin` of the length `h`; false where it
-  /// is not found.
+  /// The same for one member, at the full order of the method, in a step of size `h` from `begin`; false if it fails.
   virtual bool at_full_order(int lane, const L& begin, const L& h, double share, Parts& parts) = 0;
-  /// Places on the way through the step, between which links turn little; rates may be left as they are.
+  /// Number of places within the step, between which links turn little. waypoint(k) finds rods there; rates need not be
+  /// set.
   virtual int waypoints() const = 0;
   virtual void waypoint(int k, Parts& parts) = 0;
 };

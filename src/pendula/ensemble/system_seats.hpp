@@ -8,7 +8,7 @@
 
 namespace pendula {
 
-/// Brings systems into the lanes of a stepper and reads them there.
+/// Puts systems into the lanes of a stepper and reads them there.
 template <class Stepper>
 class SystemSeats {
   struct NoTurns {};
@@ -29,7 +29,7 @@ class SystemSeats {
 
   void follow(const Mask& /*which*/, const Mask& /*far*/) {}
 
-  /// Where the member in a lane is.
+  /// Reads the state of the member in a lane.
   void read(int lane, double* q, double* v) {
     auto& moved = stepper_.chain();
     moved.for_each_rate([&](int i, const auto& rate, const auto&) {

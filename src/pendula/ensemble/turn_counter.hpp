@@ -11,7 +11,7 @@
 
 namespace pendula {
 
-/// Follows the angles of every member's links through full turns and by poles: moves the AngleAnchor of a link where
+/// Follows the angles of every member's links through full turns and past poles: moves the AngleAnchor of a link when
 /// the link has gone too far from it.
 template <class Space, class L>
 class TurnCounter {
@@ -25,7 +25,7 @@ class TurnCounter {
 
   explicit TurnCounter(int links) : links_(links), turns_(at(links)), rods_(at(links)) {}
 
-  /// A member comes into a lane with the angles q; along(i) is its rod i.
+  /// A member starts in a lane with the angles q; along(i) is its rod i.
   template <class Along>
   void start(int lane, const double* q, Along along) {
     for (int i = 0; i < links_; ++i) {
@@ -37,8 +37,8 @@ class TurnCounter {
     }
   }
 
-  /// These members have taken a step by which links have turned less than half a turn; `far` are those that may have
-  /// gone far and come back.
+  /// Call after a step of these members in which no link has turned by half a turn or more; `far` are those that may
+  /// have turned far and come back.
   template <class Chain>
   void follow(const Mask& which, const Mask& far, const Chain& chain, Sight& sight) {
     Mask any = far;
@@ -63,8 +63,8 @@ class TurnCounter {
  private:
   struct Turn {
     std::array<AngleAnchor<Space>, lanes> anchors;
-    std::array<L, D> at{};  // where they were last followed to
-    L reach{0.0};           // how far angles near the anchor's are the only ones, in lengths, squared
+    std::array<L, D> at{};  // where links were last followed to
+    L reach{0.0};           // AngleAnchor::reach_squared, relative to the length squared
     // Within a step: which members leave their anchors; the rod on the way and how far it has turned about the axis;
     // whether the places on the way were close enough to know this.
     L leaving{0.0}, x{0.0}, y{0.0}, turned{0.0}, known{1.0};
@@ -120,7 +120,7 @@ class TurnCounter {
       const std::array<double, D> u = direction_of(rod, lane);
       if (turn.known[lane] != 0) {
         anchor.turn_to(u, turn.turned[lane]);
-      } else {  // by a pole: along the polynomial of the member's step
+      } else {  // near a pole: along the polynomial of the member's step
         const auto direction_at = [&](double share) {
           sight.at(share, rods_);
           return direction_of(rods_[i].place, lane);
@@ -156,8 +156,8 @@ class TurnCounter<Planar, L> {
     }
   }
 
-  /// These members have taken a step by which links have turned less than half a turn; `far` are those whose stages
-  /// are looked at, too.
+  /// Call after a step of these members in which no link has turned by half a turn or more; `far` are those whose
+  /// stages are followed, too.
   template <class Chain>
   void follow(const Mask& which, const Mask& far, const Chain& chain, Sight& sight) {
     for (int k = 0; xsimd::any(far) && k < sight.waypoints(); ++k) {
@@ -171,7 +171,7 @@ class TurnCounter<Planar, L> {
     return {angle(lane, turns_[at(i)]) + detail::full_turn * turns_[at(i)].count[lane]};
   }
 
-  /// θ of a link, of all members.
+  /// θ of link i of all members.
   L angles(int i) const { return fma(L(detail::full_turn), turns_[at(i)].count, angle(turns_[at(i)].at)); }
 
   /// The angle of a rod that lies nearest to another.
@@ -196,7 +196,7 @@ class TurnCounter<Planar, L> {
       const Mask was_left = x < L(0.0), is_left = rod[0] < L(0.0),
                  crosses = which & ((was_left & !is_left) | (is_left & !was_left));
       if (xsimd::any(crosses)) {
-        const L side = y * rod[0] - rod[1] * x;  // of where it crosses the vertical, times the way to the right
+        const L side = y * rod[0] - rod[1] * x;  // height where it crosses the vertical, times the way to the right
         turn.count = turn.count + select(crosses & is_left & (side < L(0.0)), L(1.0), L(0.0)) -
                      select(crosses & was_left & (side > L(0.0)), L(1.0), L(0.0));
       }

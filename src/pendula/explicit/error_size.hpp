@@ -7,9 +7,9 @@
 
 namespace pendula {
 
-/// What the errors of a step are relative to: each coordinate or rate itself, plus 1 rad or 1/s, or the size of the
-/// whole motion if that is smaller, so that oscillations of 1e-9 rad are resolved like any other. The state at the end
-/// of the step counts, too: forces may begin at zero.
+/// The scale of the errors of a step: each coordinate or rate itself, plus 1 rad or 1/s, or the size of the whole
+/// motion if that is smaller, so that oscillations of 1e-9 rad are resolved like any other. The state at the end of the
+/// step counts, too: forces may begin at zero.
 class ErrorSize {
  public:
   /// For a step from x, with derivative `rate` there, that has moved the state by `moved`.
@@ -30,7 +30,7 @@ class ErrorSize {
 
   double operator[](std::size_t i) const { return (i < half_ ? place_ : turn_) + std::abs(x_[i]); }
 
-  /// What rates at rest are rounded by, relative to coordinates over the step; and the size of a motion that has none.
+  /// Rounding of rates at rest, relative to coordinates over the step size; least size of a motion.
   static constexpr double rounding = 1e-14, nothing = 1e-16;
 
  private:

@@ -58,7 +58,7 @@ class ExplicitChain {
     angles_.read_near(i, rod, rate, q, v);
   }
 
-  // Torques depend on time through sines only, of which a step sees a small turn (ExplicitSteps::longest_step).
+  // Torques depend on time through sines only, which ExplicitSteps::longest_step resolves.
   template <class Steps>
   double followed(const Steps& /*steps*/, double /*time*/, double h) const {
     return h;

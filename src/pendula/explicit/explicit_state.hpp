@@ -12,8 +12,8 @@
 namespace pendula {
 
 /// The state of explicit methods, for one motion or for several members, one in each lane: parts, their rates and the
-/// time, with or without a tangent of each member. For one motion, sums are kept in twice the digits, so that what
-/// many small steps add is not lost to rounding. `Dynamics` is ChainAccelerations or SystemAccelerations.
+/// time, with or without a tangent of each member. For one motion, sums are kept in twice the digits, so that many
+/// small steps do not add up rounding errors. `Dynamics` is ChainAccelerations or SystemAccelerations.
 template <class Dynamics>
 class ExplicitState {
  public:
@@ -25,7 +25,7 @@ class ExplicitState {
   static constexpr std::size_t D = Dynamics::D;
   using Vector = std::array<L, D>;
 
-  /// How many parts move: links of a chain, coordinates of a system.
+  /// Number of parts: links of a chain, coordinates of a system.
   int count() const { return dynamics_.parts(); }
   const auto& parts() const { return parts_; }
 
@@ -84,7 +84,7 @@ class ExplicitState {
   };
   using LowParts = std::conditional_t<is_twofold, Parts, NoParts>;
 
-  /// Moves all parts from the state by h moved(i), and restores what a step keeps.
+  /// Moves all parts from the state by h moved(i), and restores the lengths of rods.
   template <class Moved>
   [[gnu::always_inline]] void arrive(const L& h, Moved moved, Parts& there, LowParts& low) {
     dynamics_.for_parts([&](auto i) PENDULA_WRITTEN_OUT {

@@ -178,7 +178,7 @@ class ExplicitSteps : public ExplicitState<Dynamics> {
     }
   }
 
-  /// Declares the way from `begin` to the current state a single step.
+  /// Makes dense output treat the way from `begin` to the current state as a single step.
   void set_step(const FullState& begin, double time, double h) requires is_twofold {
     before_ = begin;
     begin_ = time;

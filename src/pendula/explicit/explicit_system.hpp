@@ -142,7 +142,7 @@ class ExplicitSystem {
     }
   }
 
-  // The coordinate of the first one that is not finite; their number if there is none.
+  // The coordinate of the first number that is not finite; count() if there is none.
   std::size_t first_not_finite(const double* numbers) const {
     const auto* const found = std::find_if_not(numbers, numbers + count(), [](double x) { return std::isfinite(x); });
     return static_cast<std::size_t>(found - numbers);

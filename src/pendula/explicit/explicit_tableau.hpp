@@ -6,9 +6,9 @@
 namespace pendula {
 
 // Explicit Runge–Kutta methods: stage i is at y + h Σ_j a_ij k_j, the end at y + h Σ_i b_i k_i. The error estimate is h
-// Σ_i e_i k_i, where the last k is the slope at the end; a method with `error_order` 0 has no estimate. The estimate of
-// a method that `is_blind` compares only slopes at both ends, and does not see forces that depend on time. A new method
-// also needs a case in library/explicit_methods.hpp.
+// Σ_i e_i k_i, where the last k is the slope at the end; a method with `error_order` 0 has no estimate. If `is_blind`,
+// the estimate compares slopes at both ends only, and does not see forces that depend on time. A new method also needs
+// a case in library/explicit_methods.hpp.
 
 /// The classical Runge–Kutta method of order 4.
 struct ClassicalRungeKutta {

@@ -36,20 +36,20 @@ class FieldSteps {
         rates_(coordinates),
         arguments_(dynamics.arguments().size()) {}
 
-  /// What the speed of a coordinate at rest counts for, relative to the fastest.
+  /// The speed of a coordinate counts as at least this fraction of the fastest.
   static constexpr double beside = 1e-3;
 
   bool has_to_look() const { return look_.has_to_look(); }
 
-  /// The next step begins at an unknown state; or where the last step examined ended.
+  /// forget(): the next step begins at an unknown state. move_on(): it begins where the last examined step ended.
   void forget() { begin_is_known_ = false; }
   void move_on() {
     begin_.swap(end_);
     begin_is_known_ = end_is_known_;
   }
 
-  /// The largest over the coordinates k, relative to size_of(rate at x)(k). The path from x = (q, q̇) to `end` is the
-  /// quintic through both states with their accelerations.
+  /// What a step misses, the largest over the coordinates k, relative to size_of(rate at x)(k). The path from x = (q,
+  /// q̇) to `end` is the quintic through both states with their accelerations.
   template <class SizeOf>
   Unseen unseen(SystemForwardDynamics& dynamics, double time, double h, const std::vector<double>& x,
                 const std::vector<double>& end, SizeOf&& size_of) {

@@ -65,7 +65,7 @@ class ForcedSteps {
     return squared > 0 ? std::sqrt(squared) : 1;
   }
 
-  double turn_;  // of drives per step, at most  [rad]
+  double turn_;  // largest turn of drives in a step  [rad]
   double tolerance_, pace_ = 1;
   ForcingLook look_;
   std::vector<double> moved_, a_, sizes_;

@@ -130,7 +130,7 @@ class SingleIntegrator final : public PlainIntegrator {
   static constexpr bool has_tangents = requires(Steps steps) { steps.tangent(); };
   static constexpr int most_parts = 1024;
 
-  // How many parts the last step was taken in; states for such steps, which only steps of a given size are.
+  // Number of parts in which the last step was taken, and states for that. Only steps of a given size are divided.
   struct NoParts {
     explicit NoParts(const Steps& /*steps*/) {}
     int of_last = 1;
@@ -160,7 +160,7 @@ class SingleIntegrator final : public PlainIntegrator {
     return ok(h);
   }
 
-  // At the full order of the method.
+  // Visits the state at the fraction `share` of the last step, at the full order of the method.
   template <class Visit>
   void look(double time, double share, Visit visit) {
     if constexpr (!Steps::can_choose) {
@@ -297,7 +297,7 @@ class SingleIntegrator final : public PlainIntegrator {
   double tolerance_;
   Statistics statistics_;
   Compensated<double> time_{};
-  double begin_ = 0, step_ = 0;  // of the last step; 0: there was none
+  double begin_ = 0, step_ = 0;  // start and size of the last step; 0: there was none
   StopSign stop_;
 };
 

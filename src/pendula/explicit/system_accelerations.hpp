@@ -225,7 +225,7 @@ class SystemAccelerations {
     });
     const double place = std::clamp(std::max(q, h * v), ErrorSize::nothing, 1.0),
                  rate = std::clamp(std::max(v, h * a), ErrorSize::nothing, 1.0);
-    const double rounding = ErrorSize::rounding * q / h;  // of rates at rest
+    const double rounding = ErrorSize::rounding * q / h;  // may change rates where nothing moves: not counted as error
     double largest = 0;
     for_parts([&](int i) {
       const double speed = std::abs(before[i].rate[0]), push = std::abs(slopes[i].rate[0]);

@@ -19,9 +19,9 @@ class SystemForwardDynamics {
 
   /// Highest driving frequency  [rad/s].
   double fastest_drive() const { return here_.model().fastest_drive(); }
-  /// Whether accelerations depend on time in other ways.
+  /// Whether accelerations depend on time other than through drives.
   bool depends_on_time() const { return here_.model().info().depends_on_time; }
-  /// If so: accelerations of one state at each of `count` times, (count, coordinates).
+  /// Accelerations of one state at each of `count` times, (count, coordinates).
   void accelerations(const double* times, std::size_t count, const double* q, const double* v, double* found) {
     at_times_.accelerations({times, count}, q, v, found);
   }

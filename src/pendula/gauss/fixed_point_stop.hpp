@@ -11,22 +11,22 @@ namespace pendula {
 struct CorrectionLimits {
   double enough = 1e-18;  ///< of the first correction that is left out: far below a last bit
   double last_bit = std::numeric_limits<double>::epsilon();
-  double usual = 1e-12;  ///< where they usually stop shrinking
+  double usual = 1e-12;  ///< corrections usually stop shrinking here
   double small = 1e-9;   ///< no iteration that converges stops shrinking above this
-  int certainly = 1;     ///< how often in a row those that are larger than usual have to keep their size
+  int certainly = 1;     ///< how often in a row larger ones have to keep their size before they count as rounding
 };
 
-/// Decides when the fixed point of one motion, or of each of several, has reached round-off, from the sizes of its
-/// corrections: squared, and relative to the size of the step by `scale`, squared too.
+/// Decides when the fixed-point iteration of one motion, or of each of several, has reached round-off. It is given the
+/// squares of its corrections, and of the size of the step, `scale`.
 ///
-/// Not at a fixed tolerance, which a long chain may never meet (mathematics: "a fixed 1e-13 spins"), and not at the
-/// first correction of a few ulp either: what is left out has the same sign step after step, and energy drifts by it.
-/// An iteration stops where the *next* correction would be far below round-off, or where it no longer follows its own
-/// rate of convergence, because only rounding is left (Hairer, McLachlan, Razakarivony 2008; arXiv:1702.03354).
+/// An iteration stops where the *next* correction would be far below round-off, or where corrections no longer follow
+/// their own rate of convergence, because only rounding is left (Hairer, McLachlan, Razakarivony 2008;
+/// arXiv:1702.03354). A fixed tolerance may never be met by a long chain. Stopping at the first correction of a few ulp
+/// leaves out a remainder of the same sign step after step, by which the energy drifts.
 ///
-/// A fixed point on rates and forces is two interleaved sequences: velocities follow from the forces of the iteration
-/// before, and those from the velocities before that. Then corrections are looked at in pairs, and their rate is that
-/// of two iterations.
+/// Where the unknowns are rates and forces, set Sequences = 2: rates follow from the forces of the iteration before,
+/// and forces from its rates, so that two sequences alternate. The size of a correction is then the larger of two
+/// consecutive ones, and the rate of convergence compares sizes two iterations apart.
 template <class Num, int Sequences = 1>
 class FixedPointStop {
  public:
@@ -39,7 +39,7 @@ class FixedPointStop {
         small_(squared(limits.small)),
         certainly_(limits.certainly) {}
 
-  /// Another motion takes the place of one of several.
+  /// Another motion takes the place of this member.
   void forget(int member) { set(rate_, member, 1); }
 
   /// A new step begins.
@@ -50,7 +50,7 @@ class FixedPointStop {
     last_.fill(Num(0.0));
   }
 
-  /// Takes the corrections just made. Verdict: which iterations have arrived, and which never will.
+  /// Takes the corrections just made, squared. Verdict: which iterations are done, and which will not converge.
   struct Verdict {
     Mask done, lost;
   };
@@ -90,10 +90,9 @@ class FixedPointStop {
   }
 
  private:
-  // The next correction shrinks as the last two did together. Corrections that shrink by less than half the way that
-  // they went on average so far, and are small, are rounding. Where they are larger than is usual, it may be a mode
-  // that a step does not resolve, and that hardly moves, which converges slowly, or not at all, after those that move:
-  // rounding is what keeps its size.
+  // The next correction is expected to shrink as the last two did together. Small corrections whose rate is nearer to 1
+  // than to the average so far are rounding. Where they are larger than usual, they may belong to a mode that hardly
+  // moves and converges slowly, because the step does not resolve it; only rounding keeps its size.
   void look_ahead(Verdict& verdict, const Num& bound, const Num& now, const Num& rate) {
     const Num both = rate * before_;
     const Mask is_last = (now * now * both <= bound * bound) & (both < Num(quick * quick));
@@ -107,13 +106,13 @@ class FixedPointStop {
     if (count_ > 6) verdict.lost = verdict.lost | ((!is_small) & (rate > Num(1.0)) & (before_ > Num(1.0)));
   }
 
-  // Rate of all corrections before this one, not squared.
+  // The average rate of the corrections before this one, not squared.
   Num average() const {
     const double rates = double(count_ - 1 - Sequences) / Sequences;
     return exp(Num(0.5 / rates) * log(best_ / begin_));
   }
 
-  // Of the last corrections but `back`, one of each sequence.
+  // The square of the correction `back` iterations ago; with two sequences the larger of it and the one before.
   Num size(std::size_t back) const {
     if constexpr (Sequences == 1) return last_[back];
     return max(last_[back], last_[back + 1]);
@@ -131,11 +130,11 @@ class FixedPointStop {
   Num first_{0.0}, scale_{0.0}, begin_{0.0}, best_{0.0};
   Num rate_{1.0};    // of the second correction of a step to its first
   Num before_{1.0};  // the rate at the last one
-  Num kept_{0.0};    // corrections in a row
+  Num kept_{0.0};    // corrections in a row that kept their size
   std::array<Num, known> last_{};
 };
 
-/// Sequences of the fixed point of a solver, which says so where they are not one.
+/// FixedPointStop's Sequences for a solver: Solver::sequences, or 1 if it has no such member.
 template <class Solver>
 constexpr int sequences_of() {
   if constexpr (requires { Solver::sequences; }) {

@@ -9,9 +9,9 @@
 
 namespace pendula {
 
-/// Whether a fixed point, whose corrections were `last` and `correction` relative to the unknowns, contracts so slowly
-/// that Newton costs less; far from round-off, so that rounding is not taken for it, or after many iterations, where it
-/// is more than the `rounding` that is usual. `count` iterations were made.
+/// Whether a fixed point contracts so slowly that Newton costs less. `last` and `correction` are its last corrections
+/// relative to the unknowns, after `count` iterations. Small corrections do not count, since they may be rounding;
+/// after many iterations those above `rounding`, the usual one, do.
 inline bool diverges(double correction, double last, int count, double rounding, double epsilon) {
   if (!std::isfinite(correction)) return true;
   const double root = std::sqrt(epsilon);
@@ -20,9 +20,9 @@ inline bool diverges(double correction, double last, int count, double rounding,
   return count > 20 ? far || slow : far && count > 3 && correction > 0.7 * last;
 }
 
-/// Chooses between the two iterations by what they take: iterations a step, counted while the run goes, times the cost
-/// of one. The other one is tried for a step now and then, so that the choice follows the motion. Nothing here depends
-/// on a clock: the same run makes the same choices.
+/// Chooses between Newton and fixed point by the cost of a step: its iterations, as counted, times the cost of one. The
+/// other iteration is tried for a step now and then, so that the choice follows the motion. Nothing here depends on a
+/// clock: the same run makes the same choices.
 class IterationChoice {
  public:
   IterationChoice(Iteration wanted, double newton_cost)
@@ -40,7 +40,7 @@ class IterationChoice {
     if (is_automatic() && is_time_for_trial() && may_win(other(preferred_))) active_ = other(preferred_);
   }
 
-  /// Begins a step for a state within the last one: no trial is made, and how it is solved does not count.
+  /// Begins a step that only finds a state within the last one: no trial is made, and its cost does not count.
   void begin_look() {
     active_ = preferred_;
     iterations_ = {};
@@ -52,7 +52,7 @@ class IterationChoice {
     numbers(preferred_, spent_, steps_, wait_, next_wait_);
   }
 
-  /// Whether Newton takes over where a fixed point does not contract; else the step is not solved.
+  /// Sets whether Newton takes over where a fixed point does not contract. If not, the step is not solved.
   void allow_newton(bool allowed) { newton_is_allowed_ = allowed; }
   bool newton_is_allowed() const { return newton_is_allowed_; }
 
@@ -90,12 +90,12 @@ class IterationChoice {
     return cost_[index(iteration)] * (iterations + (iteration == Iteration::newton ? last_evaluation : 0));
   }
 
-  // A trial cannot pay where two iterations of the rival already cost more than a step does now. Fewer than two are not
-  // expected: a step that takes one Newton iteration hardly takes more of the fixed point.
+  // A trial cannot pay where two iterations of the rival cost more than a step does now. Fewer are not expected: where
+  // Newton needs one iteration, the fixed point needs hardly more.
   bool may_win(Iteration rival) const { return cost_of(rival, 2) < worthwhile * spent_[index(preferred_)]; }
 
-  // A fixed point that has given up is tried again soon, since it may have been one long step, and then ever more
-  // seldom.
+  // A fixed point that has given up is tried again soon, since one long step may have been the cause, and then ever
+  // more seldom.
   bool is_time_for_trial() {
     const bool is_turn = ++steps_ % trial_interval == trial_step;
     return wait_ > 0 ? --wait_ == 0 : is_turn;
@@ -108,12 +108,12 @@ class IterationChoice {
 
   Iteration wanted_, preferred_, active_;
   std::array<double, 2> cost_;
-  std::array<double, 2> spent_{};  // by the last step with each iteration, 0: none yet
+  std::array<double, 2> spent_{};  // cost of the last step with each iteration; 0: none yet
   std::array<int, 2> iterations_{};
   bool gave_up_ = false;
   bool newton_is_allowed_ = true;
   std::int64_t steps_ = 0;
-  int wait_ = 0, next_wait_ = 1;  // steps until a fixed point that has given up is tried; 0: it is its turn as usual
+  int wait_ = 0, next_wait_ = 1;  // steps until a fixed point that has given up is tried; 0: it has not given up
 };
 
 }  // namespace pendula

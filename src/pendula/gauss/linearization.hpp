@@ -10,19 +10,18 @@
 
 namespace pendula {
 
-/// A solver of stage equations that tells the derivative of a step, before the step is accepted.
+/// A solver of stage equations that gives the derivative of a step, before the step is accepted.
 template <class S>
 concept LinearizingSolver = requires(S solver, const S& fixed, typename S::Tangent& tangent) {
   { fixed.make_tangent() } -> std::same_as<typename S::Tangent>;
   solver.linearize(tangent);
 };
 
-/// The derivative of one step, exactly that of the discrete step; of a step that was taken in parts, their product.
-/// What its coordinates and parameters are is told where the solver's tangent is (chain_tangent.hpp,
-/// lagrangian_tangent.hpp).
+/// The derivative of one discrete step; for a step that was taken in parts, the product of theirs. Its coordinates and
+/// parameters are those of the solver's tangent (chain_tangent.hpp, lagrangian_tangent.hpp).
 ///
-/// That of a run is the product of its steps, first to last of pushed tangents, last to first of pulled gradients: a
-/// copy of each step's linearization is what a gradient keeps of the run.
+/// For a run, push tangents through its steps first to last, or pull gradients last to first: gradients need a copy of
+/// each step's linearization.
 template <class Tangent>
 class Linearization {
  public:
@@ -47,7 +46,7 @@ class Linearization {
     push(tangents.data(), columns(tangents), parameters.data());
   }
 
-  /// The same with plain numbers, row by row; the caller has to know their sizes. Null where parameters do not vary.
+  /// The same with plain numbers, row by row, of `count` columns. `parameters` is null where they do not vary.
   void push(Real* tangents, int count, const Real* parameters) {
     for (std::size_t k = 0; k < used_; ++k) {
       parameters == nullptr ? parts_[k].push(tangents, count) : parts_[k].push(tangents, count, parameters);
@@ -68,7 +67,7 @@ class Linearization {
     pull(gradients.data(), columns(gradients), parameters.data());
   }
 
-  /// The same with plain numbers. Null where no gradients by parameters are asked for.
+  /// The same with plain numbers. `parameters` is null where no gradients with respect to them are asked for.
   void pull(Real* gradients, int count, Real* parameters) {
     for (std::size_t k = used_; k-- > 0;) {
       parameters == nullptr ? parts_[k].pull(gradients, count) : parts_[k].pull(gradients, count, parameters);
@@ -82,9 +81,9 @@ class Linearization {
     return matrix;
   }
 
-  /// What follows is a step of no parts yet: the identity.
+  /// Begins a step that has no parts yet: the identity.
   void clear() { used_ = 0; }
-  /// One part more, to be filled.
+  /// Adds a part, which the caller fills.
   Tangent& next() {
     if (used_ == parts_.size()) parts_.push_back(parts_.front());
     return parts_[used_++];
@@ -112,7 +111,7 @@ namespace detail {
 
 template <class Solver>
 struct LinearizationOf {
-  using type = char;  // of a solver without one
+  using type = char;  // a placeholder, for solvers without a tangent
 };
 template <LinearizingSolver Solver>
 struct LinearizationOf<Solver> {

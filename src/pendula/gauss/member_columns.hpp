@@ -9,7 +9,7 @@ namespace pendula {
 
 namespace detail {
 
-/// One copy for registers of all widths: what compilers inline they fuse in different ways.
+/// Compiled once for registers of all widths: inlined copies would fuse multiplications and additions differently.
 template <int S>
 [[gnu::noinline]] NodePolynomials<S, double> node_polynomials(const Tableau<S>& tableau) {
   return NodePolynomials<S, double>(tableau);
@@ -17,11 +17,11 @@ template <int S>
 
 }  // namespace detail
 
-/// The coefficients of a Gauss step whose size is every member's own.
+/// The coefficients of Gauss steps of several members, each of its own size.
 ///
-/// Nodes are symmetric, and so is what they are weighed with: m_ij = ½ + k_ij with k_ji = −k_ij and, i' being the stage
-/// opposite to i, k_i'j' = −k_ij. Even and odd parts of stage values, x_j ± x_j', go through matrices of half the size,
-/// A_ij = (k_ij + k_ij')/2 and −Aᵀ: half the products, and symplectic to the last bit whatever A is rounded to.
+/// Nodes and weights are symmetric: m_ij = ½ + k_ij with k_ji = −k_ij and k_i'j' = −k_ij, i' being the stage opposite
+/// to i. Even and odd parts of stage values, x_j ± x_j', are multiplied by matrices of half the size, A_ij =
+/// (k_ij + k_ij')/2 and −Aᵀ. That halves the products, and is symplectic to the last bit whatever A is rounded to.
 template <int S, class L>
 class MemberColumns {
  public:
@@ -71,12 +71,12 @@ class MemberColumns {
     hb_[0] = hb_[at(S - 1)] = S == 1 ? h : 0.5 * rest;
   }
 
-  /// Steps that a prediction is made of at most: few stages make small steps, and many large ones.
+  /// Most steps that a prediction is made from. It pays with few stages, whose steps are short.
   static constexpr int most_depth = S <= 3 ? 8 : 1;
 
-  /// Predictions are for a step that begins at `from`, in steps from the start of the last one, and is `ratio` times as
-  /// long. Where the last `depth` steps had one size, they are made stage by stage: the values of one stage are smooth
-  /// from step to step, but those within a step are not, by their errors of order S + 1.
+  /// Prepares predictions for a step that begins at `from`, in steps from the start of the last one, and is `ratio`
+  /// times as long. Where the last `depth` steps had one size, each stage is continued from step to step. Its values
+  /// are smooth so; from stage to stage they are not, by errors of order S + 1.
   PENDULA_IN_REGISTERS void predict_at(const L& from, const L& ratio, const L& depth) {
     if (!xsimd::all((from == from_) & (ratio == ratio_))) {
       from_ = from;
@@ -97,7 +97,7 @@ class MemberColumns {
   const L& ratio() const { return ratio_; }
   const L& hb(int j) const { return hb_[at(j)]; }          ///< h b_j, their sum h exactly
   const L& hc(int j) const { return hc_[at(j)]; }          ///< h c_j
-  const L& hc_low(int j) const { return hc_low_[at(j)]; }  ///< what it lost to rounding
+  const L& hc_low(int j) const { return hc_low_[at(j)]; }  ///< what h c_j lost to rounding
 
   /// start + Σ_j m_ij x_j for all i, x times h b. Number: L, or one with its derivative (Dual).
   template <class Number>
@@ -114,7 +114,7 @@ class MemberColumns {
     }
   }
 
-  /// Stage values of the last steps, the newest first, all of them times h or none, continued at this step's stages.
+  /// The stages of the last steps, the newest first; either all of them hold the factor h, or none.
   template <class Number>
   using HistoryOf = std::array<const StagesOf<Number>*, static_cast<std::size_t>(most_depth)>;
   using History = HistoryOf<L>;
@@ -138,7 +138,7 @@ class MemberColumns {
     });
   }
 
-  /// The mean over a step of what the stage values are of.
+  /// The mean over a step of the function with these stage values.
   template <class Number>
   Number mean(const StagesOf<Number>& x) const {
     Number sum = L(b_[0]) * x[0];
@@ -149,7 +149,8 @@ class MemberColumns {
   double b(int j) const { return b_[j]; }
   double inverse_b(int j) const { return inverse_b_[j]; }
 
-  /// The coefficient of the Legendre polynomial P_k on the step, times h, of values that hold the factor h.
+  /// The coefficient of the Legendre polynomial P_k on the step, for stage values x. If x holds the factor h, so does
+  /// the coefficient.
   L legendre(int k, const Stages& x) const {
     L sum = legendre_[k][0] * x[0];
     for (int j = 1; j < S; ++j) sum = fma(L(legendre_[k][j]), x[at(j)], sum);
@@ -163,11 +164,11 @@ class MemberColumns {
     return sum;
   }
 
-  /// Weights of stage values, times h, for when a share of the step is done.
+  /// Weights of stage values, which hold the factor h, where a share of the step is done.
   struct Shares {
     double share = -1;
     std::array<double, static_cast<std::size_t>(S)> values,
-        ahead;  ///< for the value then; for the integral from then on
+        ahead;  ///< of the value there; of the integral from there to the end
   };
   const Shares& shares(double share) {
     Shares* weights = &shares_.front();

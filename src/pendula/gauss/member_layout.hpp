@@ -17,7 +17,7 @@ struct MembersInLanes {
   using Sum = L;
   static constexpr int stages = S, cells = S;
   static constexpr int together =
-      S == 1 ? 1 : 2;  ///< stages in a sweep: of one alone each operation waits for the one before
+      S == 1 ? 1 : 2;  ///< stages that a sweep goes through at a time: two hide each other's latency
 
   template <int Count>
   struct Cells : std::array<Num, static_cast<std::size_t>(Count)> {
@@ -43,7 +43,7 @@ struct MembersInLanes {
     static constexpr int stages() { return S; }
     static constexpr int deepest() { return Base::most_depth; }
 
-    const Columns& at_hand() const { return *this; }  // more than registers hold
+    const Columns& at_hand() const { return *this; }  // no copy: registers do not hold it all
     L weight(int j) const { return L(Base::b(j)); }
     L inverse_weight(int j) const { return L(Base::inverse_b(j)); }
 

@@ -13,18 +13,18 @@
 
 namespace pendula {
 
-/// How far the stage equations are solved.
+/// How accurately the stage equations are solved.
 struct MembersStepperOptions {
-  /// Of the first correction that is left out, relative to what the step moves: by default a thousandth of a last bit.
+  /// Size of the first correction that is left out, relative to the size of the step; by default far below a last bit.
   double enough = CorrectionLimits().enough;
   int max_iterations = 50;
-  bool are_chosen = false;  ///< steps are, by their errors
+  bool are_chosen = false;  ///< steps are adaptive
 };
 
-/// Gauss steps of several members at once, one in each lane, every one of a size of its own, by fixed point. `Members`
+/// Gauss steps of several members at once, one in each lane, each of its own size, solved by fixed point. `Members`
 /// holds their states and stages: ChainMembers of chains, SystemMembers of systems.
 ///
-/// What becomes of a member depends on that member alone, to the last bit: a lane whose iteration has ended is frozen,
+/// The motion of a member depends on that member alone, to the last bit: a lane whose iteration has ended is frozen,
 /// and one that fails stays where its last accepted step ended.
 template <class Members>
 class MembersStepper {
@@ -43,7 +43,7 @@ class MembersStepper {
    public:
     explicit Controller(double tolerance) : tolerance_(tolerance), steps_(stages, 2 * stages, tolerance) {}
 
-    /// Members that start. Loads take or bring energy anyway.
+    /// These members start. Those with loads have greedy steps, since their energy changes anyway.
     void start(const Mask& which, MembersStepper& stepper) {
       steps_.steer(which, stepper.chain().loaded());
       steps_.start(which, stepper.tempo());
@@ -61,7 +61,7 @@ class MembersStepper {
    private:
     double tolerance_;
     StepController<L> steps_;
-    L longest_{std::numeric_limits<double>::infinity()};  // that shows what depends on time
+    L longest_{std::numeric_limits<double>::infinity()};  // step that resolves forces that depend on time
   };
 
   explicit MembersStepper(Subject subject, MembersStepperOptions options = {})
@@ -86,8 +86,8 @@ class MembersStepper {
     tangent_stop_.forget(lane);
   }
 
-  /// Solves steps of `h` from `time` of the members that are `wanted`; gives those where that worked. The state stays
-  /// what it was.
+  /// Solves steps of size `h` from `time` for the members that are `wanted`. Returns those where that worked. The state
+  /// does not change.
   Mask solve(const L& time, const L& h, const Mask& wanted) {
     const L ratio = h / last_;
     const Mask alike = (known_ > L(cold)) & (ratio <= L(detail::farthest_extrapolation));
@@ -107,8 +107,8 @@ class MembersStepper {
     return found & (chain_.turn() < L(farthest * farthest));
   }
 
-  /// Goes back to where the last step began of all members, which `chain().save()` has kept. Their stages are still
-  /// known: the next steps are predicted from them.
+  /// Puts all members back to the start of their last step, which `chain().save()` has kept. The next steps are
+  /// predicted from its stages.
   void go_back() requires(!Chain::has_tangent) {
     chain_.restore(L(0.0) == L(0.0));
     known_ = select(known_ == L(accepted), L(solved), L(cold));
@@ -123,8 +123,8 @@ class MembersStepper {
   /// Chain::take_growth.
   L take_growth(const Mask& which) requires(Chain::has_tangent) { return chain_.take_growth(which); }
 
-  /// Members whose stages may be a solution that is not the motion: those that came far from where they began, or turn
-  /// far.
+  /// Members whose stages may be a solution that is not the motion: those with a large first correction, or a large
+  /// turn.
   Mask doubtful() const {
     return (stop_.first() > L(detail::trusted_prediction * detail::trusted_prediction) * chain_.scale()) | turns_far();
   }
@@ -132,7 +132,7 @@ class MembersStepper {
   /// Members whose angles are to be followed from stage to stage.
   Mask turns_far() const { return chain_.turn() > L(detail::trusted_turn * detail::trusted_turn); }
 
-  /// What is known of the stages of these members is wrong: their next step starts cold.
+  /// Forgets the stages of these members: their next step starts cold.
   void forget(const Mask& which) { known_ = select(which, L(cold), known_); }
 
   /// Iterations of all members that were made so far.
@@ -142,7 +142,7 @@ class MembersStepper {
   static constexpr bool solves_tangents_after = requires(Chain & chain, const Mask& active) {
     chain.iterate_tangent(active);
   };
-  // Near singular places tangents are rounded to little more than this.
+  // As FixedPointStop's `enough`. Near singular states tangents are rounded to little more than this.
   static constexpr double tangent_enough = 1e-12;
   static constexpr double cold = 0, solved = 1, accepted = 2;
 
@@ -164,7 +164,7 @@ class MembersStepper {
     return decay;
   }
 
-  // Iterates until each member has arrived or never will; returns those that have. once(active) makes one iteration.
+  // Iterates until each member has converged or will not. Returns those that have. once(active) makes one iteration.
   template <class Stop, class Once>
   Mask iterate(const Mask& wanted, Stop& stop, const L& scale, Once once) {
     stop.restart(scale);
@@ -181,9 +181,9 @@ class MembersStepper {
   Chain chain_;
   MembersStepperOptions options_;
   FixedPointStop<L, sequences_of<Chain>()> stop_;
-  FixedPointStop<L> tangent_stop_;  // of stages of tangents that are solved after the motion's
+  FixedPointStop<L> tangent_stop_;  // for tangents whose stages are solved after the motion's
   L known_{cold}, last_{0.0},
-      depth_{0.0};  // of the stages: what they are of, the size of their step, how many such steps it follows
+      depth_{0.0};  // cold, solved or accepted; size of that step; number of steps of this size before it
   std::int64_t iterations_ = 0;
 };
 

@@ -7,22 +7,22 @@
 
 namespace pendula {
 
-/// Decides when Newton's iteration has reached round-off, from the sizes of its corrections relative to the unknowns,
-/// as FixedPointStop does of a fixed point: where the next correction would be far below round-off, or where it no
-/// longer follows its own rate of convergence.
+/// Decides when Newton's iteration has reached round-off, from the sizes of its corrections relative to the unknowns.
+/// Like FixedPointStop, it stops where the next correction would be far below round-off, or where corrections no longer
+/// follow their own rate of convergence.
 class NewtonStop {
  public:
-  /// `epsilon` is that of the numbers that are iterated on.
+  /// `epsilon` is that of the type of the unknowns.
   NewtonStop(int links, double epsilon) : epsilon_(epsilon), small_(most_rounding(links, epsilon)) {}
 
-  /// A new step begins. What Newton's constant C was is remembered from step to step.
+  /// A new step begins. Newton's constant C is remembered from step to step.
   void restart() {
     count_ = 0;
     last_ = 0;
     ++steps_;
   }
 
-  /// Takes the size of a correction just applied; tells whether it was the last one needed.
+  /// Takes the size of a correction just applied. Returns whether no more are needed.
   bool reached(double correction) {
     const double before = std::exchange(last_, correction);
     if (++count_ == 1) {
@@ -52,7 +52,7 @@ class NewtonStop {
     return safety * constant_ * correction * correction <= negligible();
   }
 
-  // Corrections that shrink by less than half the way that they went on average so far, and are small, are rounding.
+  // Small corrections whose rate is nearer to 1 than to the average so far are rounding.
   bool has_stalled(double rate) const {
     if (last_ > small_ || rate < 0.5) return false;
     const double average = std::pow(best_ / first_, 1.0 / std::max(1, count_ - 2));
@@ -60,7 +60,7 @@ class NewtonStop {
   }
 
   double negligible() const { return 1e-20 * coarseness(epsilon_); }
-  // Corrections below may be rounding alone and say nothing of C.
+  // Smaller corrections may be rounding alone and say nothing of C.
   double noise() const { return 1e-12 * coarseness(epsilon_); }
 
   static constexpr double safety = 10;

@@ -13,28 +13,28 @@
 
 namespace pendula {
 
-/// How fast a system goes on: R² = κ + (Σ v_k⁸)^(1/4) over the angles, κ the fastest that a coordinate alone would
-/// swing with, or begin to, where the motion starts. 1/R is the time in which the motion changes. Of one motion, or of
-/// several members.
+/// The pace R of one motion, or of several members: 1/R is the time in which the motion changes. R² = κ +
+/// (Σ v_k⁸)^(1/4), summed over the angles. κ is the largest ω² with which a coordinate alone would swing, or begin to
+/// move, where the motion starts.
 template <class Num>
 class Pace {
  public:
   /// `info` has to outlive it.
   explicit Pace(const SystemInfo& info) : is_angle_(info.is_angle) {}
 
-  /// Of a system at q and v  (coordinates).
+  /// Starts a motion at q and v  (coordinates).
   void start(const SystemAt<1>& here, const double* q, const double* v) requires(!is_batch<Num>) {
     const std::size_t count = is_angle_.size();
     const Forces first(here, q, v, is_angle_);
     slowest_squared_ = stiffness(here, q, v, first, is_angle_);
     natural_speed_squared_ = slowest_squared_ > 0 ? first.speed_squared() / slowest_squared_ : 0;
-    // Where nothing turns or pushes yet, 1/s is as good as any; where nothing moves, one unit of length a second.
+    // Where nothing turns or pushes yet, a pace of 1/s is as good as any; where nothing moves, one unit a second.
     if (slowest_squared_ > 0 || at(v, v).pace > 0) return;
     slowest_squared_ = 1;
     if (!std::all_of(v, v + count, [](double rate) { return rate == 0; })) return;
     for (std::size_t k = 0; k < count; ++k) natural_speed_squared_ += first.mass(k);
   }
-  /// A member comes, with the pace that it has.
+  /// A member comes, with its own pace.
   void start(int member, const Pace<double>& own) {
     set(slowest_squared_, member, own.slowest_squared());
     set(natural_speed_squared_, member, own.natural_speed_squared());
@@ -43,13 +43,13 @@ class Pace {
   /// κ  [1/s²].
   const Num& slowest_squared() const { return slowest_squared_; }
 
-  /// Σ M_kk v_k² of what forces at the start give in the time 1/√κ: what rates are small against.
+  /// Σ M_kk v_k² of the rates that forces at the start give in the time 1/√κ. Rates are small compared to these.
   const Num& natural_speed_squared() const { return natural_speed_squared_; }
 
   /// R², from Σ v_k⁸ over the angles.
   Num squared(const Num& eighth_powers) const { return slowest_squared_ + sqrt(sqrt(eighth_powers)); }
 
-  /// R from rates, and how it grows by their accelerations  (coordinates, members).
+  /// R from rates, and d ln R/dt from accelerations  (coordinates, members).
   TempoOf<Num> at(const double* v, const double* a) const {
     Num sum(0.0), growth(0.0);  // of Σ v_k⁸, an eighth of it
     for (std::size_t k = 0; k < is_angle_.size(); ++k) {
@@ -71,8 +71,8 @@ class Pace {
  private:
   static constexpr std::size_t width = width_of<Num>;
 
-  /// Forces and their slopes at a state. Where something damps, what is odd in the rates is left out: a motion that is
-  /// damped at once is no pace.
+  /// Forces and their slopes at a state. With damping the part that is odd in the rates is left out: motion that is
+  /// damped at once does not set the pace.
   class Forces {
    public:
     Forces(const SystemAt<1>& here, const double* q, const double* v, std::span<const bool> is_angle)
@@ -112,7 +112,7 @@ class Pace {
       return sum;
     }
 
-    /// Σ M_kk v_k² of rates as they are, and what forces would give on the way from 0.
+    /// Σ M_kk v_k² of the present rates, plus the work Σ |f_k q_k| of forces on the way from 0.
     double scale(const double* q, const double* v) const {
       double sum = 0;
       for (std::size_t k = 0; k < f_.size(); ++k) sum += mass(k) * v[k] * v[k] + std::abs(f_[k] * q[k]);
@@ -130,8 +130,9 @@ class Pace {
     std::vector<double> f_, p_D_v_, f_D_q_;
   };
 
-  /// κ of a motion that starts with `first`. Where forces hardly change with the place, as at the inflection of a
-  /// potential, what the motion meets a time t later counts, too, but as 1/t² at most. Until then forces are constant.
+  /// κ of a motion that starts with `first`. Where forces hardly change with the coordinates, as at the inflection of a
+  /// potential, κ where the motion comes to in a time t counts, too, but as 1/t² at most. Forces are taken as constant
+  /// until then.
   static double stiffness(const SystemAt<1>& here, const double* q, const double* v, const Forces& first,
                           std::span<const bool> is_angle) {
     constexpr double longest = 0x1p20, shortest = 0x1p-30;  // s
@@ -143,7 +144,7 @@ class Pace {
     for (double time = std::min(longest, 1 / std::sqrt(at_start)); time > shortest; time /= 2) {
       for (std::size_t k = 0; k < there.size(); ++k) there[k] = q[k] + time * (v[k] + time / 2 * first.acceleration(k));
       const double met = Forces(here, there.data(), v, is_angle).stiffness();
-      if (most == at_start && met > at_start / 2 && met < 2 * at_start) return at_start;  // as of a spring
+      if (most == at_start && met > at_start / 2 && met < 2 * at_start) return at_start;  // as with a spring
       most = std::max(most, std::min(met, 1 / (time * time)));
     }
     return most;

@@ -12,9 +12,9 @@ enum class Convergence {
   quadratic  ///< δ_{k+1} ≈ C δ_k²: Newton
 };
 
-/// Where iterations on so many links usually stop shrinking, relative: 1e-12 in double, more where links are many. The
-/// velocity of a link is the difference of momenta of all masses below it, a second one along the chain: rounding grows
-/// like the square of its length. (Measured in space: 8e-10, 9e-8 and 1e-5 for 10³, 10⁴ and 10⁵ links.)
+/// The relative size at which corrections for so many links usually stop shrinking: 1e-12 in double, more for many
+/// links. The velocity of a link is a second difference of momenta along the chain, so rounding grows like the square
+/// of the number of links. (Measured in space: 8e-10, 9e-8 and 1e-5 for 10³, 10⁴ and 10⁵ links.)
 inline double usual_rounding(int links, double epsilon) {
   return std::max(4500.0, 45.0 * links * links) * epsilon;
 }

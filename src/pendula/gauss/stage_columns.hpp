@@ -12,8 +12,8 @@
 namespace pendula::detail {
 
 /// The coefficients of a step, one column a stage, padded to `Width` lanes. S may be Eigen::Dynamic: then columns are
-/// padded like rows, and what lanes beyond the stages hold must be finite. Another step size costs a few operations on
-/// packs: steps may differ from one to the next.
+/// padded like rows, and lanes beyond the stages must hold finite numbers. Another step size costs only a few
+/// operations on packs.
 template <int S, class Real, int Width = lanes_for<Real>(S)>
 class StageColumns {
   using L = Pack<Width, RegisterFor<Width, Real>>;
@@ -26,7 +26,7 @@ class StageColumns {
 
   int stages() const { return static_cast<int>(stages_); }
 
-  /// For a step of `h` after one of `previous` (0: there is none).
+  /// Prepares a step of size `h` after one of `previous` (0: there is none).
   void prepare(Real h, Real previous) {
     if (h != h_) {
       h_ = h;
@@ -37,8 +37,8 @@ class StageColumns {
     if (ratio != ratio_) predict_at(Real(1), ratio);
   }
 
-  /// Predictions are for a step that begins at `from`, in steps from the start of the one that they are made of, and is
-  /// `ratio` times as long.
+  /// Prepares predictions for a step that is `ratio` times as long as the last one, and begins at `from`, in steps from
+  /// the start of the last one.
   void predict_at(Real from, Real ratio) {
     from_ = from;
     ratio_ = from == 1 ? ratio : Real(0);
@@ -82,7 +82,7 @@ class StageColumns {
     return product(m_, stored, start);
   }
 
-  /// The polynomial through stage values that hold the factor h b, at the start of their step.
+  /// The polynomial through stage values, at the start of their step. x holds them times h b_j.
   Real at_start(const Real* x) const {
     Real sum(0);
     for (std::size_t j = 0; j < stages_; ++j) sum += h_ == 0 ? Real(0) : Real(start_[j] * x[j] / hb_[j]);
@@ -95,17 +95,17 @@ class StageColumns {
     return gain;
   }
 
-  /// Coefficients of the Legendre polynomials on the step, times h, of the polynomial through stage values that hold
-  /// the factor h b.
+  /// x holds stage values, each times h b_j. A polynomial goes through the values themselves. Returns its coefficients
+  /// in Legendre polynomials on the step, times h.
   L legendre(const Real* x) const { return product(legendre_, x); }
 
-  /// Bounds of |∫_0^x f| and of |f(x) − f(0)| over the step, both times h, where the polynomial through stage values
-  /// h b f is all that is known of f: its last two coefficients tell what it misses.
+  /// Bounds of |∫_0^x f| and of |f(x) − f(0)| over the step, both times h. Known are the stage values, times h b,
+  /// alone: the last two coefficients of the polynomial through them tell what it misses of f.
   struct Excursion {
     Real integral, change;
   };
   Excursion excursion(const Real* x) const {
-    constexpr Real missed_at_most(4);  // last coefficients; 1.3 were seen
+    constexpr Real missed_at_most(4);  // times the last coefficients; 1.3 times was seen
     alignas(pack_alignment) Real coefficients[Z];
     legendre(x).store(coefficients);
     using std::abs;
@@ -119,23 +119,23 @@ class StageColumns {
   /// The polynomial through the last step's stage values, at this step's stages.
   L extrapolated(const Real* last) const { return product(extrapolation_, last); }
 
-  /// The same of values that hold the factor h b of their step.
+  /// The same, where `last` holds the values times h b of their step.
   L extrapolated_increments(const Real* last) const { return product(increments_, last); }
 
   using Weights = typename NodePolynomials<S, Real>::Values;
 
-  /// Of stage values: the polynomial through them at x, and its integral from the start of their step to x.
+  /// Weights of stage values: of the polynomial through them at x, and of its integral from the start to x.
   Weights values(const Real& x) const { return polynomials_.lagrange(x); }
   Weights integrals(const Real& x) const { return polynomials_.integrals(x); }
 
-  /// Of stage values that hold the factor h b: what they add up to from the start of their step to x.
+  /// Weights of stage values times h b: of the integral of the polynomial from the start of their step to x.
   Weights up_to(const Real& x) const {
     Weights weights = polynomials_.integrals(x);
     for (std::size_t j = 0; j < stages_; ++j) weights[j] *= inverse_b_[j];
     return weights;
   }
 
-  /// The polynomial through them at x, their step being h.
+  /// Weights of the same: of the polynomial at x in a step of size h.
   Weights rate_at(const Real& x, const Real& h) const {
     Weights weights = polynomials_.lagrange(x);
     for (std::size_t j = 0; j < stages_; ++j) weights[j] *= inverse_b_[j] / h;

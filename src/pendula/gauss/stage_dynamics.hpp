@@ -5,7 +5,7 @@
 
 namespace pendula {
 
-/// A system where it moves, and at the stages of a step.
+/// Calls the functions of a system, at one state and at the stages of a step.
 template <int Width>
 class StageDynamics {
  public:

@@ -10,8 +10,8 @@
 
 namespace pendula {
 
-/// What the solvers of chains and of any other system share: their stage equations are solved by exact Newton, by fixed
-/// point, or by whichever takes less.
+/// What the solvers of chains and of any other system share: they solve stage equations by exact Newton, by fixed
+/// point, or by whichever costs less.
 template <class Stages>
 class StageIterations {
  public:
@@ -49,7 +49,7 @@ class StageIterations {
   }
 
  protected:
-  /// newton_cost: of one iteration, in fixed-point iterations.
+  /// newton_cost: the cost of a Newton iteration, in fixed-point iterations.
   template <class... Given>
   StageIterations(Iteration iteration, double newton_cost, Given&&... stages)
       : stages_(std::forward<Given>(stages)...), choice_(iteration, newton_cost) {}

@@ -14,7 +14,7 @@ namespace pendula {
 
 /// How stage values are laid out where one motion is solved: all stages of a number in one pack. MembersInLanes is the
 /// layout of several members. A Row is one number at all stages; it is made of cells, which are worked on one by one.
-/// Where S is Eigen::Dynamic, their number is told at run time, at most Width; what a row holds beyond them is zero.
+/// Where S is Eigen::Dynamic, the number of stages is given at run time, at most Width; the rest of a row is zero.
 template <int S, class Real, int Width = lanes_for<Real>(S)>
 struct StagesInLanes {
   using Num = Real;
@@ -63,7 +63,7 @@ struct StagesInLanes {
     static constexpr bool is_fixed = S != Eigen::Dynamic;
 
    public:
-    /// Steps that a prediction is made of at most: few stages make small steps, and many large ones.
+    /// Most steps that a prediction is made from. It pays with few stages, whose steps are short.
     static constexpr int most_depth = (is_fixed ? S <= 3 : Width <= 4) && sizeof(Real) >= sizeof(double) ? 8 : 1;
     int deepest() const { return Base::stages() <= 3 ? most_depth : 1; }
 
@@ -74,9 +74,7 @@ struct StagesInLanes {
 
     void prepare(const Real& h) { Base::prepare(h, Real(0)); }
 
-    /// Predictions are for a step that begins at `from`, in steps from the start of the last one, and is `ratio` times
-    /// as long. Where the last `depth` steps had one size, they are made stage by stage: the values of one stage are
-    /// smooth from step to step, but those within a step are not, by their errors of order S + 1.
+    /// As MemberColumns::predict_at.
     void predict_at(const Real& from, const Real& ratio, const Real& depth) {
       ratio_ = ratio;
       depth_ = static_cast<int>(depth);
@@ -93,7 +91,8 @@ struct StagesInLanes {
       }
     }
 
-    /// What sweeps ask for at every link, in registers: stores to stages might be stores to the columns.
+    /// What sweeps need at every link, copied to registers: a compiler must assume that stores to stages change the
+    /// columns.
     class AtHand {
      public:
       explicit AtHand(const Columns& columns)
@@ -127,7 +126,7 @@ struct StagesInLanes {
     };
     AtHand at_hand() const requires is_fixed { return AtHand(*this); }
 
-    /// The same of a number of stages that is told at run time: more than registers need to hold.
+    /// The same where the number of stages is given at run time: registers would not hold the columns.
     class Reference {
      public:
       explicit Reference(const Columns& columns) : columns_(columns) {}
@@ -145,7 +144,7 @@ struct StagesInLanes {
     L weight(int /*cell*/) const { return L::load(weights_); }
     L inverse_weight(int /*cell*/) const { return L::load(inverse_weights_); }
 
-    /// Stage values of the last steps, the newest first, all of them times h or none, continued at this step's stages.
+    /// The stages of the last steps, the newest first; either all of them hold the factor h, or none.
     using History = std::array<const Row*, static_cast<std::size_t>(most_depth)>;
     [[gnu::always_inline]] void extrapolate(const History& last, Row& next, bool times_h) const {
       if (is_deep()) {
@@ -158,7 +157,7 @@ struct StagesInLanes {
       next.set(0, times_h ? L(ratio_) * value : value);
     }
 
-    /// The mean over a step of what the stage values are of.
+    /// The mean over a step of the function with these stage values.
     Real mean(const Row& x) const { return StagesInLanes::total(weight(0) * x[0]); }
     static Real total(const Row& x) { return StagesInLanes::total(x.numbers()); }
 
@@ -166,7 +165,7 @@ struct StagesInLanes {
     bool is_deep() const { return most_depth > 1 && depth_ > (is_fixed ? S : Base::stages()); }
 
     Real from_{1}, made_for_{1}, ratio_{1};
-    int depth_ = 1, weighed_ = 0;  // steps that predictions are made of, and that `across_` is for
+    int depth_ = 1, weighed_ = 0;  // steps that predictions are made from, now and when `across_` was computed
     std::array<L, static_cast<std::size_t>(most_depth)> across_;
     alignas(pack_alignment) Real weights_[Z]{};
     alignas(pack_alignment) Real inverse_weights_[Z]{};

@@ -4,17 +4,18 @@
 
 namespace pendula {
 
-/// What the stages of a step are predicted from: whether the last step was accepted, was solved only, or there is none.
+/// What the stages of a step are predicted from: an accepted step that it follows, a solved step from the same state,
+/// or nothing (cold).
 template <class C>
 struct StagePrediction {
   MaskOf<C> follows, again, cold;
-  C depth;  ///< how many steps of this size they are predicted from
-  C known;  ///< how many there are
+  C depth;  ///< number of steps of this size that they are predicted from
+  C known;  ///< number of steps of this size before
 };
 
 namespace detail {
 
-/// Steps that are longer than the last one by more than this factor are out of reach of its polynomial.
+/// A step longer than this many last steps is not predicted from the polynomial of the last one.
 inline constexpr double farthest_extrapolation = 1.5;
 
 }  // namespace detail

@@ -6,8 +6,8 @@
 
 namespace pendula::detail {
 
-/// The linear system of one Newton iteration: a row and a column for each stage of each coordinate, those of one
-/// coordinate side by side, as stages lie in packs.
+/// The linear system of one Newton iteration. It has a row and a column for each stage of each coordinate; the stages
+/// of one coordinate are consecutive, as in packs.
 class StageSystem : public LinearSystem {
  public:
   StageSystem(std::size_t coordinates, int stages)
@@ -15,7 +15,8 @@ class StageSystem : public LinearSystem {
 
   std::size_t stages() const { return stages_; }
 
-  /// Of the residuals of coordinate `row` at all stages by the unknown of `column` at stage k.
+  /// Sets the derivatives of the residuals of coordinate `row` at all stages, with respect to the unknown of coordinate
+  /// `column` at stage k.
   template <class L>
   void set_derivative(std::size_t row, std::size_t column, std::size_t k, const L& lanes) {
     write(lanes, &matrix(at(row, 0), at(column, k)));
@@ -24,7 +25,7 @@ class StageSystem : public LinearSystem {
   void set_residual(std::size_t row, const L& lanes) {
     write(lanes, &right[at(row, 0)]);
   }
-  /// Of coordinate k at stage i.
+  /// The correction of coordinate k at stage i.
   double correction(std::size_t k, std::size_t i) const { return solution[at(k, i)]; }
 
   /// The row of coordinate k at stage i.
@@ -40,7 +41,7 @@ class StageSystem : public LinearSystem {
     }
     alignas(pack_alignment) double numbers[width];
     lanes.store(numbers);
-    for (std::size_t i = 0; i < width; ++i) {  // of a known number: else a compiler calls memmove
+    for (std::size_t i = 0; i < width; ++i) {  // width is a constant: otherwise a compiler calls memmove
       if (i < stages_) to[i] = numbers[i];
     }
   }

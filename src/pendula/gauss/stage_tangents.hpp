@@ -12,10 +12,10 @@
 
 namespace pendula {
 
-/// Tangents of the motions of several systems, one in each lane, along Gauss steps: the variational equations of
-/// coordinates and rates, (δq)˙ = δq̇, (δq̇)˙ = δq̈, at the stages of a step that was solved, by a fixed point of their
-/// own. Together with the motion's they are one system of equations, solved by one Gauss method, and so have its order.
-/// They are not the derivatives of the steps themselves, which are taken in momenta.
+/// Tangents of the motions of several systems, one in each lane, along Gauss steps. They follow the variational
+/// equations of coordinates and rates, (δq)˙ = δq̇, (δq̇)˙ = δq̈. The stages of these are solved after those of the
+/// motion, by a fixed point of their own. Motion and tangent are one system of equations for the Gauss method, so that
+/// tangents have its order. They are not the derivatives of the steps themselves, which are taken in momenta.
 template <int S, class L>
 class StageTangents {
  public:
@@ -55,8 +55,8 @@ class StageTangents {
     find_scale();
   }
 
-  /// One iteration for the members that are `active`, those of the others stay; what changed, squared. stage(j, 0), (j,
-  /// 1), (j, 2): times, q and q̇ of stage j.
+  /// One iteration for the members that are `active`. Returns the square of what changed. stage(j, 0), stage(j, 1) and
+  /// stage(j, 2) are times, q and q̇ of stage j.
   template <class Stage>
   L iterate(const Mask& active, Stage stage) {
     for (CoordinateTangent& part : parts_) {
@@ -84,11 +84,11 @@ class StageTangents {
   }
   const L& scale() const { return scale_; }  ///< what changes are compared with, squared
 
-  /// Sums up what the stages add to the tangents; these stay as they are. To be called before `decay` and `accept`.
+  /// Computes what the stages add to the tangents, which do not change yet. Call before `decay` and `accept`.
   void finish() {
     newest_ = (newest_ + pasts - 1) % pasts;
     for (CoordinateTangent& part : parts_) {
-      find_rates(part);  // by the last pushes, however long the iteration of other members went on
+      find_rates(part);  // from its own last iteration, however long those of other members went on
       Past& past = part.past[newest_];
       detail::unrolled<S>([&](auto j) PENDULA_WRITTEN_OUT {
         past.moved[j] = L(columns_.inverse_b(j)) * part.moved[j];
@@ -114,7 +114,7 @@ class StageTangents {
     }
   }
 
-  /// Keeps the tangents, and goes back there.
+  /// save() keeps all tangents. restore(which) puts those of these members back.
   void save() {
     for (CoordinateTangent& part : parts_) part.saved = {part.place, part.rate};
   }
@@ -172,7 +172,7 @@ class StageTangents {
     detail::unrolled<S>([&](auto j) PENDULA_WRITTEN_OUT { part.moved[j] = columns_.hb(j) * part.rates[j]; });
   }
 
-  // What it would be if the tangents were pushed as hard as their pace tells, and what they are.
+  // The scale of changes, squared: the change of tangents in a step at their pace, and h b δq̈ of the last step.
   void find_scale() {
     scale_ = (columns_.h() * columns_.h()) * squared() / measure_.inverse_pace_squared();
     for (int k = 0; k < count(); ++k) {

@@ -8,21 +8,21 @@
 
 namespace pendula {
 
-/// How steps of its own choice follow the motion.
+/// How a controller chooses the next step.
 enum class Steering {
-  symmetric,  ///< by a density of steps that goes forward as it goes back: no drift, and a reversed run returns
-  greedy      ///< by the error of the last step alone: for motion that takes or gives energy anyway
+  symmetric,  ///< by a density of steps that is reversible: no drift, and a reversed run returns
+  greedy      ///< by the error of the last step alone: for motion that gains or loses energy anyway
 };
 
-/// Chooses the steps of a Gauss or Radau method, of one motion or of several, so that each errs by no more than a
-/// tolerance. Errors are compared by their logarithms.
+/// Chooses the steps of a Gauss or Radau method, of one motion or of several, so that the error of each is at most the
+/// tolerance. Errors are held as logarithms.
 ///
 /// Symmetric steps are h = c/ρ, where the density ρ follows the pace R of the motion,
 ///   ρ₊ = ρ₋ + c d ln R/dt,
-/// from the step before a state to the one after it, the derivative being that of the state (Hairer and Söderlind,
-/// SIAM J. Sci. Comput. 26 (2005) 1838). Backwards that is the same recursion. The tolerance decides on c. It becomes
-/// smaller where a step errs by more, and larger where all of the last 2^k steps erred by less; k grows with each such
-/// change, so that c changes less and less often.
+/// from the step before a state to the one after it, with the derivative at that state (Hairer and Söderlind, SIAM J.
+/// Sci. Comput. 26 (2005) 1838). Backwards that is the same recursion. The tolerance decides on c: it becomes smaller
+/// where the error of a step is too large, and larger where those of all of the last 2^k steps were small. k grows with
+/// each such look, so that c changes less and less often.
 template <class Num>
 class StepController {
  public:
@@ -38,10 +38,10 @@ class StepController {
 
   bool chooses() const { return tolerance_ > 0; }
 
-  /// From now on these motions are steered by the error of the last step, or not.
+  /// From now on these motions have greedy steps, or symmetric ones.
   void steer(const Mask& which, const Mask& greedily) { greedy_ = (which & greedily) | (greedy_ & !which); }
 
-  /// Motions that start, at this tempo.
+  /// These motions start, at this tempo.
   void start(const Mask& which, const TempoOf<Num>& tempo) {
     const Mask moves = tempo.pace > Num(0.0);
     scale_ = select(which, Num(first_scale_), scale_);
@@ -51,13 +51,13 @@ class StepController {
     window_.length = select(which, Num(1.0), window_.length);
   }
 
-  /// Of the next step, unless the run ends before.
+  /// The size of the next step, unless the run ends before.
   Num step() const {
     const Num step = scale_ / density_;
     return select(last_step_ > Num(0.0), min(step, Num(most_growth) * last_step_), step);
   }
 
-  /// Which of the steps of size h that were solved are good enough; of the others the next one is smaller.
+  /// Returns which of the solved steps of size h are good enough. Where one is not, the next try is smaller.
   Mask accepts(const Mask& which, const StepDecay<Num>& decay, const Num& h) {
     log_error_ = decay.log_error(stages_, order_) + Num(std::log(safety));
     Num log_excess = log_error_ - Num(log_tolerance_);
@@ -81,7 +81,7 @@ class StepController {
     forget_errors(which);
   }
 
-  /// Steps of size h that the controller chose were taken. tempo() is that of the state where they ended.
+  /// Call when steps of size h that the controller chose were taken. tempo() is that of the state where they ended.
   template <class FindTempo>
   void move_on(const Mask& which, const Num& h, FindTempo tempo) {
     last_step_ = select(which, h, last_step_);
@@ -92,7 +92,7 @@ class StepController {
     watch(symmetric);
   }
 
-  /// The motion is reversed where it is: what is remembered of the density goes the other way.
+  /// The motion is reversed where it is: the densities before and after it change places.
   void turn_back() { std::swap(density_, density_before_); }
 
   template <class Numbers>
@@ -108,7 +108,7 @@ class StepController {
     Num largest_error{never}, steps{0.0}, length{1.0};
   };
 
-  // What a step is to be multiplied by, so that an error becomes so much of the tolerance; at most e².
+  // The factor by which a step has to change so that its error becomes `wanted` times the tolerance; at most e².
   Num growth(double wanted, const Num& log_error) const {
     return exp(min((Num(std::log(wanted) + log_tolerance_) - log_error) * Num(1.0 / order_), Num(2.0)));
   }
@@ -118,7 +118,7 @@ class StepController {
     scale_ = select(which, h * density_ * factor, scale_);
   }
 
-  // The density is brought back where it has lost the pace: that a run does not retrace, and is rare.
+  // Where the density is far from the pace, it starts anew: a reversed run does not repeat that, but it is rare.
   void follow(const Mask& which, const TempoOf<Num>& tempo) {
     const Num next = fma(scale_, tempo.quickening, density_);
     const Mask near = (next < Num(farthest) * tempo.pace) & (Num(farthest) * next > tempo.pace);
@@ -127,7 +127,7 @@ class StepController {
     if (any(which & !near)) start_density(which & !near, tempo);
   }
 
-  // Half a step on from the state.
+  // Sets the densities half a step before and after the state.
   void start_density(const Mask& which, const TempoOf<Num>& tempo) {
     const Num change = Num(0.5) * (scale_ * tempo.quickening);
     const Num within = max(Num(-0.5) * tempo.pace, min(change, tempo.pace));
@@ -151,10 +151,10 @@ class StepController {
     window_.steps = select(which, Num(0.0), window_.steps);
   }
 
-  // What errors grow by on their way to the end of a run, as measured on random chains.
+  // By this factor errors grow on their way to the end of a run, as measured on random chains.
   static constexpr double safety = 4;
   static constexpr double aim = 0.2;  // of the tolerance, where c is set
-  // Energy that may be missing, in tolerances, where stages show no error: beside them motion may be singular.
+  // Energy error that is allowed, in tolerances. Stages may show no error where motion is singular between them.
   static constexpr double most_imbalance = 5, energy_rounding = 1e-13;
   static constexpr double greedy_aim = 0.03, greedy_growth = 1.5, least_growth = 0.3;
   static constexpr double most_growth = 4, worthwhile = 1.05;
@@ -166,7 +166,7 @@ class StepController {
   Mask greedy_;
   Num scale_{1.0}, density_{1.0}, density_before_{0.0};
   Num last_step_{0.0};    // of the controller's choice; 0: there was none
-  Num log_error_{never};  // of the last step that was solved
+  Num log_error_{never};  // logarithm of the error of the last step that was solved
   Window window_;
 };
 

@@ -9,13 +9,13 @@
 
 namespace pendula {
 
-/// How many steps of one size the stages of one motion are predicted from. Where steps are short each stage is
-/// continued best from all steps that are known; where they are long, from the polynomial through the stages of the
-/// last step. The first correction of a fixed point tells which is better, and the other one is tried now and then.
+/// Chooses how many steps of one size the stages of one motion are predicted from. With short steps each stage is best
+/// continued from all known steps; with long ones, from the polynomial through the stages of the last step. The first
+/// correction of a fixed point tells which is better, and the other way is tried now and then.
 class PredictionDepth {
  public:
-  /// The depth for the next step, which is as long as the last one or not; 0: its stages are predicted from the last
-  /// step alone. More than `stages` steps are needed, and `most` are used; if `most` <= `stages`, it is always 0.
+  /// The number of steps for the next prediction; 0: from the polynomial of the last step. `as_long`: the next step is
+  /// as long as the last one. More than `stages` steps are needed, and at most `most` are used.
   int next(bool as_long, int stages, int most) {
     known_ = as_long ? std::min(known_ + 1, most) : 0;
     const bool prefers_many = by_many_ <= by_last_;
@@ -24,7 +24,7 @@ class PredictionDepth {
     return is_by_many_ ? known_ : 0;
   }
   bool is_by_many() const { return is_by_many_; }
-  /// Steps of its size that it follows, at most `most`.
+  /// Number of steps of the same size before the next step, at most `most`.
   int known() const { return known_; }
 
   /// The first correction of the step, relative to the unknowns.
@@ -59,8 +59,8 @@ class StepPrediction {
     StagePrediction<double> kind;
   };
 
-  /// For a method of so many stages, from at most `most` steps. From then on no step is known until this one is
-  /// accepted, because its stages take the place of the last step's.
+  /// Chooses for a method with this number of stages, from at most `most` steps. Then no step is known until this one
+  /// is accepted, because its stages replace those of the last step.
   Source next(const StepTask& task, int stages, int most) {
     const double known_h = last_h_ != 0 ? last_h_ : h_;
     h_ = task.h;
@@ -96,9 +96,10 @@ class StepPrediction {
   double last_h() const { return last_h_; }      ///< size of the last accepted step; 0: its stages are not there
   std::int64_t steps() const { return steps_; }  ///< accepted
 
-  /// How much larger the error of the prediction is than that of the stage polynomial at the start of its own step: at
-  /// least gain_of_polynomial(), where it is that polynomial. Predictions from many steps are better than that, so that
-  /// their first corrections tell nothing of it (0); one step in several is looked at.
+  /// By which factor the error of the prediction exceeds that of the stage polynomial at the start of its own step:
+  /// gain_of_polynomial() where the stages were predicted by that polynomial. A prediction from many steps is better,
+  /// so that a small first correction does not show a small error: 0 in one such step of several, which has it looked
+  /// at.
   template <class FindGain>
   double gain(FindGain gain_of_polynomial) const {
     if (depth_.is_by_many() && steps_ % looked_at == 0) return 0;

@@ -4,7 +4,7 @@ namespace pendula {
 
 /// What the stages of a step are predicted from.
 enum class PredictedFrom {
-  last_step,  ///< the step that led to this state; nothing where there was none of about that size
+  last_step,  ///< the step that led to this state, if it was of about this size; otherwise nothing
   same_step,  ///< the last step that was solved from this state, of another size
   nothing     ///< the motion goes on as it does at the start of the step
 };

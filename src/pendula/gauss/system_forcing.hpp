@@ -11,21 +11,21 @@
 
 namespace pendula {
 
-/// How long the steps of a system may be for their stages to see what depends on time.
+/// Limits the steps of a system so that their stages resolve forces that depend on time.
 class SystemForcing {
  public:
   SystemForcing(const SystemModel& model, Family family, int stages)
       : SystemForcing(model, tableau_of<Eigen::Dynamic>(family, stages), order_of(family, stages)) {}
 
-  /// Where a system is, (coordinates), the motion changing in 1/pace.
+  /// The state of a system, (coordinates), and its pace.
   struct Here {
     double time;
     const double *q, *v;
     double pace;
   };
 
-  /// The longest step up to h from the state that `look` returns, a Here. Inputs that are sines turn in it by no more
-  /// than stages sum up: no stage shows what a weak one does that turns often within a step.
+  /// The longest step up to h from the state that `look` returns, a Here. Sines on inputs turn in it by no more than
+  /// the stages integrate to the tolerance: they would not show that a weak sine turns often within a step.
   template <class Look>
   double followed(double h, double tolerance, Look&& look) {
     const SystemModel& model = at_times_.model();
@@ -33,7 +33,7 @@ class SystemForcing {
     if (fastest > 0) h = std::min(h, turn_.within(tolerance) / fastest);
     if (!model.info().depends_on_time) return h;
     const Here here = look();
-    for (std::size_t k = 0; k < sizes_.size(); ++k) {  // of angles a radian at least
+    for (std::size_t k = 0; k < sizes_.size(); ++k) {  // at least a radian for angles
       sizes_[k] = std::max(std::abs(here.q[k]), model.info().is_angle[k] ? 1.0 : 0.0);
     }
     return look_.resolved(

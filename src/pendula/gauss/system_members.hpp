@@ -21,8 +21,8 @@
 
 namespace pendula {
 
-/// Systems of one kernel, one in each lane, and the stages of a Gauss step of theirs (SystemMotion). With a tangent of
-/// each member (StageTangents), whose stages are solved after the motion's.
+/// Systems of one kernel, one in each lane, and the stages of their Gauss steps (SystemMotion); if asked for, with a
+/// tangent of each member (StageTangents), whose stages are solved after those of the motion.
 template <int S, class Register = MemberRegister, bool with_tangent = false>
 class SystemMembers
     : public SystemMotion<MembersInLanes<S, LanePack<Register>>, MemberSystems<LanePack<Register>>&, MomentumForm> {
@@ -35,8 +35,8 @@ class SystemMembers
   using Subject = MemberSystems<L>&;
   static constexpr int stages = S, links_known = Eigen::Dynamic;
   static constexpr bool has_tangent = with_tangent;
-  static constexpr int sequences = 2;         ///< of corrections of its fixed point, as LagrangianSolver's
-  static constexpr int most_iterations = 25;  ///< of a step whose size is chosen
+  static constexpr int sequences = 2;         ///< FixedPointStop's
+  static constexpr int most_iterations = 25;  ///< in an adaptive step
   static constexpr std::size_t D = 1;
   using Vector = std::array<L, D>;
   using typename Base::Columns;
@@ -86,9 +86,9 @@ class SystemMembers
     for (int i = 0; i < count(); ++i) visit(i, Vector{Base::rate(static_cast<std::size_t>(i))}, L(0.0));
   }
 
-  /// Whether fixed points may ask for shorter steps than errors do: forces and lengths may be anything.
+  /// Whether convergence of the fixed point may need shorter steps than errors do: always, since any force is possible.
   Mask may_be_stiff() const { return L(0.0) == L(0.0); }
-  /// Whether energy may come from outside, or go there.
+  /// Whether loads may bring or take energy.
   Mask loaded() const { return loaded_ > L(0.0); }
 
   /// T + U  [J].
@@ -102,14 +102,14 @@ class SystemMembers
   /// |T| + |U| where the energy was asked for last  [J].
   const L& energy_sum() const { return energy_sum_; }
 
-  /// What the energy at the end of the step that was solved is to be, by what loads bring  [J].
+  /// The energy that the end of the solved step should have: the present one and the work of loads  [J].
   L energy_due() {
     const L energy = this->energy();
     brought_ = brought();
     kinetic_before_ = kinetic_;
     return energy + brought_;
   }
-  /// What energies are compared to: the kinetic one, the largest that there was  [J].
+  /// Energy errors are relative to this: the largest kinetic energy so far, and the work of loads  [J].
   L energy_scale(const L& /*due*/) const { return max(max(kinetic_before_, kinetic_), 0.5 * fastest_) + abs(brought_); }
 
   /// R and d ln R/dt, as Pace.
@@ -119,14 +119,14 @@ class SystemMembers
     quickening = found.quickening;
   }
 
-  /// The longest step in which stages sum up what inputs are driven by, to a tolerance.
+  /// The longest step in which stages integrate the sines on inputs to a tolerance  [s].
   L longest_step(double tolerance) const {
     return L(SineTurn(S, 2 * S).within(tolerance)) / dynamics_.fastest_drives();
   }
 
   // --- A step ---
 
-  /// Predicts the stages of a step of `h` from `time`, `ratio` times as long as the one that they are known from.
+  /// Predicts the stages of a step of `h` from `time`, `ratio` times as long as the one that it is predicted from.
   void prepare(const L& time, const L& h, const L& ratio, const StagePrediction<L>& from) {
     columns_.prepare(h);
     for (int j = 0; j < S; ++j) (time + columns_.hc(j)).store(Base::call(j, 4));
@@ -138,8 +138,8 @@ class SystemMembers
     find_scale();
   }
 
-  /// One fixed-point iteration for the members that are `active`, those of the others stay; what changed, squared,
-  /// relative to the size of the step.
+  /// One fixed-point iteration for the members that are `active`. Returns the square of what changed; compare with
+  /// scale().
   PENDULA_IN_REGISTERS [[gnu::noinline]] L iterate(const Mask& active) {
     find_stages();
     L change(0.0);
@@ -153,19 +153,18 @@ class SystemMembers
   const L& scale() const { return scale_; }  ///< size of the step, squared
 
   /// Places the stages of the motion where the iteration of each member ended, however long those of others took.
-  /// Returns what changes of tangents are compared with, squared.
+  /// Returns the scale of changes of tangents, squared.
   const L& start_tangents() requires with_tangent {
     find_stages();
     return tangent_.scale();
   }
-  /// The same iteration of the tangents there.
+  /// One fixed-point iteration of the tangents at these stages.
   L iterate_tangent(const Mask& active) requires with_tangent {
     return tangent_.iterate(active,
                             [this](int j, int which) { return Base::call(j, which == 0 ? 4 : 2 * (which - 1)); });
   }
 
-  /// Evaluates the stages that were solved; the state stays as it is. To be called before `turn`, `pace_squared`,
-  /// `decay` and `accept`.
+  /// Evaluates the solved stages; the state stays as it is. Call before `turn`, `pace_squared`, `decay` and `accept`.
   void finish() {
     Base::keep_stages();
     Base::find_speeds();
@@ -174,20 +173,20 @@ class SystemMembers
     if constexpr (has_tangent) tangent_.finish();
   }
 
-  /// The most that an angle turns in the step, squared; twice as far where its inertia nearly vanishes  [rad²]. A
-  /// member whose inertia has vanished turns beyond all bounds.
+  /// The largest turn of any angle in the step, squared  [rad²]. The turn of an angle with almost no inertia is
+  /// doubled; with none it is infinite.
   L turn() const {
     const L infinite(std::numeric_limits<double>::infinity());
     return select(masses_.is_singular(), infinite, turn_ * turn_);
   }
-  /// From where on stages may be no motion  [rad].
+  /// With larger turns the solution of the stage equations may not be the motion  [rad]. `chosen`: steps are adaptive.
   double largest_turn(bool chosen) const { return detail::largest_turn_of(chosen || dynamics_.constant_masses()); }
 
   /// R in the middle of the step, squared, times h².
   L pace_squared() const { return (columns_.h() * columns_.h()) * pace_squared_; }
 
   /// The coefficient of the Legendre polynomial P_n in the rates, times h, relative to the size of the motion, squared;
-  /// 0 where it may be what coordinates are rounded by. With a share of the tangent's.
+  /// 0 where it may be rounding of coordinates. With a share of that of the tangent.
   L decay(int n) const {
     const L fastest = Base::fastest();
     L squared(0.0);
@@ -201,7 +200,7 @@ class SystemMembers
   }
 
   /// By how much the polynomial through the rates misses those at the start of the step, times h, relative to the size
-  /// of the motion, squared; 0 where it may be what coordinates are rounded by.
+  /// of the motion, squared; 0 where it may be rounding of coordinates.
   L missed_at_start() const {
     Base::find_rates(time_);
     const L fastest = Base::fastest();
@@ -213,8 +212,8 @@ class SystemMembers
     return seen(squared, fastest);
   }
 
-  /// Energy that is missing at the end of the step or too much, relative to what there is, where lengths are among the
-  /// coordinates: motion may then be singular beside the stages. 0 of others.
+  /// The relative error of the energy at the end of the step, if lengths are among the coordinates: motion may then be
+  /// singular between the stages. Otherwise 0.
   L imbalance() const { return may_miss_ ? Base::imbalance(brought()) : L(0.0); }
 
   /// Coordinates and rates of the members whose step was accepted, when `share` of it was done, by the polynomial
@@ -235,7 +234,7 @@ class SystemMembers
     }
   }
 
-  /// Keeps where the members are, and goes back there.
+  /// save() keeps the states of all members. restore(which) puts these members back to them.
   void save() {
     Base::keep(saved_);
     if constexpr (has_tangent) tangent_.save();
@@ -264,7 +263,7 @@ class SystemMembers
     NoTangent(MemberSystems<L>& /*dynamics*/, const Columns& /*columns*/) {}
   };
 
-  // What of a squared increment is not rounding of coordinates, relative to the size of the motion.
+  // A squared increment relative to the size of the motion; 0 if it may be rounding of coordinates.
   L seen(const L& squared, const L& fastest) const {
     constexpr double visible = StepShape::visible;
     const L share = squared * (pace_squared_ / fastest);
@@ -296,7 +295,8 @@ class SystemMembers
     }
   }
 
-  // Increments of coordinate k, or of its momentum, by what was found at the stages; what changed, squared.
+  // Replaces the increments of coordinate k, or of its momentum, by those found at the stages. Returns the square of
+  // what changed.
   [[gnu::always_inline]] L replace(int which, std::size_t k, const Mask& active) {
     auto& increments = U_[which == 2 ? k : count_ + k];
     L changed(0.0);
@@ -308,7 +308,7 @@ class SystemMembers
     return changed;
   }
 
-  // By loads, in the step that was solved  [J].
+  // The work of loads in the solved step  [J].
   L brought() const { return any(loaded()) ? select(loaded(), Base::work(), L(0.0)) : L(0.0); }
 
   typename Base::FullState saved_;

@@ -19,15 +19,15 @@
 namespace pendula {
 
 /// Coordinates, momenta and stages of any system that moves by Gauss steps, q̇ = v(q, p), ṗ = f(q, v) (MomentumForm; in
-/// VelocityForm rates have the place of momenta); of one motion (StagesInLanes) or of several members (MembersInLanes):
-/// what both share. `DynamicsType` calls the functions of the system: here(time, function, numbers…) where motions are,
-/// and call(times, function, numbers…) at stages.
+/// VelocityForm rates have the place of momenta). What one motion (StagesInLanes) and several members (MembersInLanes)
+/// share. `DynamicsType` calls the functions of the system: here(time, function, numbers…) at the state, and
+/// call(times, function, numbers…) at stages.
 ///
-/// Stages are held as increments, h b v of a coordinate and h b f of its momentum; the state carries what it has lost
-/// to rounding:
+/// Stages are held as increments, h b v of a coordinate and h b f of its momentum; the state is compensated, with what
+/// it has lost to rounding:
 ///   Q = q + m U_q,  P = p + m U_p,  m_ij = a_ij / b_j.
 ///
-/// Coordinates may have any units. Changes of them are compared as √M_kk dq_k, and those of momenta as dp_k / √M_kk.
+/// Coordinates may have any units. Their changes are compared as √M_kk dq_k, those of momenta as dp_k / √M_kk.
 template <class LayoutType, class DynamicsType, class Form>
 class SystemMotion {
  public:
@@ -39,7 +39,7 @@ class SystemMotion {
   using Row = typename Layout::Row;
   using Dynamics = std::remove_reference_t<DynamicsType>;
 
-  /// A reference to dynamics has to outlive it.
+  /// If DynamicsType is a reference, its object must outlive this one.
   SystemMotion(DynamicsType dynamics, Family family, int stages)
       : dynamics_(static_cast<DynamicsType&&>(dynamics)),
         columns_(family, stages),
@@ -55,7 +55,7 @@ class SystemMotion {
 
   const SystemInfo& info() const { return dynamics_.info(); }
   const Columns& columns() const { return columns_; }
-  /// Coordinates.
+  /// Number of coordinates.
   std::size_t count() const { return count_; }
 
   // --- The state ---
@@ -70,7 +70,7 @@ class SystemMotion {
     return pace_.at(room(2), room(3));
   }
 
-  /// Where the motion is, to come back to.
+  /// The state, to come back to.
   struct FullState {
     std::vector<Compensated<Num>> state;
     std::vector<Num> turns;
@@ -90,9 +90,9 @@ class SystemMotion {
     fastest_ = select(which, place.fastest, fastest_);
   }
 
-  // --- Of the step that was solved ---
+  // --- The step that was solved ---
 
-  /// Energy that forces, and what holds time, bring  [J].
+  /// Energy that forces, and terms that depend on time, bring  [J].
   Num work() const {
     typename Layout::Sum work(Num(0.0));
     const auto inverse_h = Layout::spread(Num(Num(1.0) / columns_.h()));
@@ -107,8 +107,8 @@ class SystemMotion {
     return Layout::total(work);
   }
 
-  /// Energy at the end of the step less that of its start and what loads bring, without its sign, relative to kinetic
-  /// and potential energy, or to the energy that motion comes to from rest where it starts without any.
+  /// The size of the energy error of the step, `brought` being the work of loads; relative to kinetic and potential
+  /// energy, or to the energy that motion from rest comes to where that is larger.
   Num imbalance(const Num& brought) const {
     const Balance of = balance(brought);
     const Num scale = max(max(of.start.size(), of.finish.size()), pace_.natural_speed_squared()) + abs(brought);
@@ -116,14 +116,14 @@ class SystemMotion {
   }
 
  protected:
-  static constexpr double invisible = 1e-9;  // of coordinates: what corrections need not be compared with
+  static constexpr double invisible = 1e-9;  // of coordinates: corrections are not compared with smaller changes
   static constexpr auto pasts = static_cast<std::size_t>(Columns::most_depth);
 
   struct Energies {
     Num kinetic, total;
     Num size() const { return abs(kinetic) + abs(total - kinetic); }
   };
-  // Over the step.
+  // Energies over the step.
   struct Balance {
     Num brought;
     Energies start, finish;
@@ -136,7 +136,7 @@ class SystemMotion {
 
   // --- The state ---
 
-  // A coordinate and its momentum, of a member.
+  // Sets a coordinate and its momentum, of a member.
   void start(int member, std::size_t k, double q, double p) {
     Compensated<double> angle{q, 0};
     double whole = 0;
@@ -176,7 +176,7 @@ class SystemMotion {
   // Workspace: four numbers of each coordinate, of one state; then three numbers.
   double* room(std::size_t which, std::size_t k = 0) const { return room_[which * count_ + k]; }
 
-  // Room(0), room(1) and room(2) hold q, p and v of the motion then; v only after find_rates.
+  // Writes q to room(0) and p to room(1). find_rates adds v, room(2).
   void write_state() const {
     for (std::size_t k = 0; k < 2 * count_; ++k) to_row(state_[k].value, room(0, k));
   }
@@ -187,13 +187,13 @@ class SystemMotion {
   void rates_of_room(const Num& time) const {
     Form::rates(at(time), count_ * width_of<Num>, room(0), room(1), room(2));
   }
-  // Calls functions of the system where motions are.
+  // Calls functions of the system at the state.
   auto at(const Num& time) const {
     return [this, &time](auto function, auto... numbers) { dynamics_.here(time, function, numbers...); };
   }
   Num rate(std::size_t k) const { return from_row<Num>(room(2, k)); }
 
-  // Of the state that is in room(0) and room(2).
+  // Energies of the state in room(0) and room(2).
   Energies energies(const Num& time) const {
     dynamics_.here(time, &SystemFunctions::energies, room(0), room(2), room(4), room(4, 1));
     return {from_row<Num>(room(4)), from_row<Num>(room(4, 1))};
@@ -211,8 +211,8 @@ class SystemMotion {
 
   // --- A step ---
 
-  /// Predicts the stages of a step of `h` from `time`, `ratio` times as long as the one that they are known from. The
-  /// times of the stages are to be set before.
+  /// Predicts the stages of a step from `time`, `ratio` times as long as the one that it is predicted from. The times
+  /// of the stages must be set before.
   void predict(const Num& time, const Num& ratio, const StagePrediction<Num>& from) {
     columns_.predict_at(select(from.again, Num(0.0), Num(1.0)), ratio, from.depth);
     time_ = time;
@@ -227,8 +227,8 @@ class SystemMotion {
     find_size();
   }
 
-  // Predicts the motion as it goes on at the start of the step. Steps before get no weight, but their numbers are
-  // replaced, too: zero times a number that is not finite would not be zero.
+  // Predicts constant rates and forces from those at the start of the step. The numbers of earlier steps are replaced,
+  // too, although their weight is 0: zero times a number that is not finite is not zero.
   void start_cold(const Mask& cold) {
     const auto& columns = columns_.at_hand();
     write_state();
@@ -249,7 +249,7 @@ class SystemMotion {
     }
   }
 
-  // Nothing is compared with less than would show in the coordinates.
+  // Finds the size of the coordinates, squared: of angles at least a radian.
   void find_size() {
     size_squared_ = Num(0.0);
     for (std::size_t k = 0; k < count_; ++k) {
@@ -264,7 +264,7 @@ class SystemMotion {
     return calls_[static_cast<std::size_t>(cell) * per_call() + static_cast<std::size_t>(which) * count_ + k];
   }
 
-  // Coordinate k at the stages, or its momentum.
+  // Computes coordinate k at the stages, or its momentum.
   [[gnu::always_inline]] void place_stages(std::size_t k, int which) const {
     const std::size_t at = static_cast<std::size_t>(which) * count_ + k;
     Row added;
@@ -273,7 +273,7 @@ class SystemMotion {
                   PENDULA_WRITTEN_OUT { (Layout::spread(state_[at].value) + added[j]).store(call(j, which, k)); });
   }
 
-  /// What the next steps are predicted from: h v and h f at the stages.
+  /// Keeps h v and h f at the stages, for predictions of later steps.
   void keep_stages() {
     newest_ = (newest_ + pasts - 1) % pasts;
     for (std::size_t k = 0; k < 2 * count_; ++k) {
@@ -282,7 +282,7 @@ class SystemMotion {
     }
   }
 
-  /// Of the stages the largest Σ M_kk v_k², and R² in the middle of the step.
+  /// Finds the largest Σ M_kk v_k² of the stages, and R² in the middle of the step.
   void find_speeds() {
     Row speeds;
     Cell eighth_powers(Num(0.0));
@@ -303,11 +303,11 @@ class SystemMotion {
     pace_squared_ = pace_.squared(Layout::of_stage(eighth_powers, columns_.stages() / 2));
   }
 
-  /// The fastest of all stages so far, Σ M_kk v_k², and no less than forces at the start bring.
+  /// The largest Σ M_kk v_k² of all stages so far, and at least what forces at the start give.
   Num fastest() const { return max(max(fastest_, fastest_here_), pace_.natural_speed_squared()); }
 
-  /// The most that an angle turns in the step, one whose inertia nearly vanishes twice: it does not go on like that.
-  /// visit(k, turn of coordinate k).
+  /// Calls visit(k, turn of coordinate k in the step). The turn of an angle with almost no inertia is doubled, because
+  /// its rate changes fast.
   template <class Visit>
   void for_each_turn(Visit visit) const {
     for (std::size_t k = 0; k < count_; ++k) {

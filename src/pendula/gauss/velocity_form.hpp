@@ -65,7 +65,7 @@ class VelocityJacobians {
                        vectors_[3 * count_], matrices_[0], matrices_[count_ * count_], matrices_[2 * count_ * count_]);
   }
 
-  /// Computes the increments of the coordinates from the accelerations as they are.
+  /// Computes the increments of the coordinates from the present accelerations.
   void follow(Stages& stages) {
     for (std::size_t k = 0; k < count_; ++k) {
       const L v = stages.momentum(k);
@@ -76,7 +76,7 @@ class VelocityJacobians {
 
   L residual(const Stages& /*stages*/, std::size_t row) const { return L::load(vectors_[3 * count_ + row]); }
 
-  /// ∂(residual of row, stage i)/∂(K of column, stage k) of all i.
+  /// ∂(residual of row, stage i)/∂(K of column, stage k) for all i.
   L derivative(const typename Stages::Columns& columns, std::size_t row, std::size_t column, std::size_t k) const {
     const L through_q =
         fma(L::load(squared_[k]), L::load(entry(0, row, column)), L(entry(2, row, column)[k]) * columns.unit(k));

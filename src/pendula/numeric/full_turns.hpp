@@ -8,8 +8,8 @@ namespace pendula::detail {
 /// 2π as the sum of two doubles.
 inline constexpr double full_turn = 6.283185307179586, full_turn_low = 2.4492935982947064e-16;
 
-/// Full turns are taken out of angles beyond `some_turns`. Beyond `unknown_turns` a double no longer tells the angle
-/// within a turn  [rad].
+/// Full turns are taken out of angles larger than `some_turns`. Beyond `unknown_turns` a double does not resolve the
+/// angle within a turn  [rad].
 inline constexpr double some_turns = 8, unknown_turns = 1e15;
 
 /// Takes the full turns out of the angles in the mask `among` that have some, and adds their number to `turns`. Without

@@ -2,10 +2,10 @@
 
 namespace pendula {
 
-/// The longest number that a processor has, for sums and angles on their way to and from rods.
+/// The longest floating-point type of a processor, for sums and for conversions between angles and rods.
 ///
-/// WebAssembly has none but double: there long double is made of function calls, and with Clang 14 results of theirs
-/// were wrong without a word.
+/// WebAssembly has only double. Its long double is made of function calls, whose results were wrong with Clang 14,
+/// without a word.
 #ifdef __wasm__
 using LongReal = double;
 #else

@@ -6,13 +6,13 @@
 #include <cstdint>
 #include <pendula/numeric/fast_fma.hpp>
 
-/// What makes one text serve both a plain number (one motion) and a LanePack (several members): a plain number is
-/// treated as a pack of one. For packs the same names are friend functions, found by argument-dependent lookup.
+/// Functions by which one source serves both a plain number (one motion) and a LanePack (several members): a plain
+/// number is a pack of one. For packs the same names are friend functions, found by argument-dependent lookup.
 namespace pendula {
 
 namespace detail {
 
-/// In place of zero, which has no logarithm and divides nothing.
+/// Used in place of zero in logarithms and divisors.
 inline constexpr double almost_zero = 1e-300;
 
 }  // namespace detail
@@ -56,7 +56,7 @@ Real select(bool which, const Real& yes, const Real& no) {
   return which ? yes : no;
 }
 
-// As SIMD registers do it: b where either is NaN.
+// Like SIMD registers: b where either is NaN.
 template <std::floating_point Real>
 Real max(const Real& a, const Real& b) {
   return a > b ? a : b;
@@ -66,7 +66,7 @@ Real min(const Real& a, const Real& b) {
   return a < b ? a : b;
 }
 
-/// LanePack's.
+/// For plain numbers: LanePack has the reason.
 template <std::floating_point Real>
 Real in_register(const Real& a) {
   return a;
@@ -105,7 +105,7 @@ using std::floor;
 using std::log;
 using std::sqrt;
 
-/// The number of one member; a plain number has but one.
+/// The number of one member; a plain number is that of the only one.
 template <std::floating_point Real>
 Real get(const Real& x, int /*member*/) {
   return x;

@@ -5,8 +5,8 @@
 
 namespace pendula {
 
-/// What programs of kernels and expressions both do with numbers of any kind: calls row(its name in programs, its name
-/// in expressions, function).
+/// Calls row(name in programs, name in expressions, function) for each operation that both the programs of kernels and
+/// expressions have. Functions take numbers of any kind.
 template <class Row>
 constexpr void shared_operations(Row row) {
   using std::tan, std::asin, std::acos, std::atan, std::sinh, std::cosh, std::tanh, std::exp, std::log, std::sqrt,
@@ -30,7 +30,7 @@ constexpr void shared_operations(Row row) {
 
 namespace detail {
 
-/// How many operands such a function has, of one to three.
+/// Number of operands of such a function, one to three.
 template <class Function, class Number = double>
 inline constexpr int operands_of = std::is_invocable_v<Function, Number>           ? 1
                                    : std::is_invocable_v<Function, Number, Number> ? 2

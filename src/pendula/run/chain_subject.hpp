@@ -129,10 +129,10 @@ class ChainSubject : public Subject {
   }
 
   using Subject::distance;
-  /// The larger of the distance of bobs, relative to the length of the chain, and that of angles  [rad]; in space that
-  /// of directions, because after a pole two or more pairs of angles stand for one direction. Plus the larger distance
-  /// of rates, relative to the fastest bob and rod there; these count at least as a tenth of the chain's swing
-  /// frequency and a hundredth of the fastest theta in the motion.
+  /// The sum of two numbers. The first is the larger of the distance of bobs, relative to the length of the chain, and
+  /// that of angles  [rad]; in space of directions, because several pairs of angles stand for one direction. The second
+  /// is the larger relative distance of rates: of bobs to the fastest bob of `a`, of rods to its fastest rod, but at
+  /// least to a tenth of the chain's swing frequency and a hundredth of the fastest theta in the motion.
   double distance(const Motion& a, const Motion& b, const Motion& size) const override {
     const auto furthest = [](const auto& x) { return x.colwise().norm().maxCoeff(); };
     const auto of = [](double off, double whole) { return off == 0 ? 0 : off / whole; };

@@ -24,12 +24,12 @@ struct Varied {
 /// variation. An input is varied by a constant.
 std::vector<Varied> varied_by(const Subject& subject);
 
-/// A motion to differentiate, exactly as its steps move it; their sizes are held fixed.
+/// A motion to differentiate. Derivatives are those of its discrete steps; step sizes are held fixed.
 struct MotionTask {
   const Subject& subject;
   const RunOptions& options;  ///< gauss or radau in momentum form
   const Motion& start;
-  std::span<const double> times;  ///< ascending, from the start's on; a step ends at each  [s]
+  std::span<const double> times;  ///< ascending, none before the start; a step ends at each  [s]
   std::function<bool()> stop = [] { return false; };
 };
 
@@ -48,16 +48,17 @@ struct Forward : MovedTo {
 /// Throws std::invalid_argument for methods that have no derivative, and for wrong sizes.
 Forward move_variations(const MotionTask& task, const Directions<>& of_start, const Directions<>& of_parameters);
 
-/// Gradients by the start, (2 coordinates), and by parameters, (varied).
+/// Gradients with respect to the start, (2 coordinates), and to parameters, (varied).
 struct Backward : MovedTo {
   Eigen::VectorXd of_start, of_parameters;
 };
 
-/// The transpose: propagates the gradients of a number by the motions at the times, (2 coordinates x times), back to
-/// those by the start and the parameters. Steps are taken a second time for it. Throws as move_variations.
+/// The transpose of move_variations. `gradients`, (2 coordinates x times), are those of a number with respect to the
+/// motions at the times. Returns those with respect to the start and the parameters. Takes the steps twice. Throws as
+/// move_variations.
 Backward move_gradients(const MotionTask& task, const Directions<>& gradients);
 
-/// Throws std::invalid_argument where a link in space is at a pole: there is no derivative by phi there.
+/// Throws std::invalid_argument where a link in space is at a pole: no derivative with respect to phi exists there.
 void require_regular(const Subject& subject, const Motion& motion);
 
 /// dq/dt, dv/dt at a motion, (2 coordinates).

@@ -19,8 +19,8 @@ namespace pendula {
 /// Which sign changes count.
 enum class Direction { up, down, both };
 
-/// The function of an event as a formula of a few quantities of the motion, so that it can be enclosed over an interval
-/// of time once these are.
+/// The function of an event as a formula of a few quantities of the motion. Bounds of these over an interval of time
+/// give bounds of the formula.
 class Formula {
  public:
   Formula() = default;
@@ -28,15 +28,15 @@ class Formula {
   Formula& operator=(const Formula&) = delete;
   virtual ~Formula() = default;
 
-  /// How many quantities it depends on, besides the time.
+  /// How many quantities the formula depends on, besides the time.
   virtual std::size_t size() const = 0;
-  /// Reads these from a motion.
+  /// Reads the quantities from a motion.
   virtual void read(const Motion& motion, std::span<double> numbers) = 0;
   virtual double value(double time, std::span<const double> numbers) = 0;
   virtual Reach reach(const Reach& time, std::span<const Reach> numbers) = 0;
 };
 
-/// Bounds of the states of a motion over an interval of time: each number lies between those of both.
+/// Bounds of the states of a motion over an interval of time, for each coordinate and rate.
 struct MotionRange {
   Motion least, most;
 };

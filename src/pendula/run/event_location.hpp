@@ -35,7 +35,7 @@ inline double place_of_miss(std::size_t degree) {
   return next_to_middle[degree];
 }
 
-/// What an interpolant may be off by, relative to how much it varies, so that it shows where a function changes sign.
+/// The largest error of an interpolant, relative to its variation, with which it still shows sign changes.
 inline constexpr double resolved_tail = 1e-3;
 
 /// The sign change implied by the signs at both ends of a step.
@@ -91,7 +91,7 @@ std::optional<double> other_sign(double from, double to, int sign, Value value, 
   if (sign == 0 || sign_of(value(to)) != sign) return {};
   double low = from, high = to, u = low + golden * (high - low), height = sign * value(u);
   for (int tries = 0; tries < most_turns && height >= 0 && goes_on() && high - low > nearest; ++tries) {
-    const bool is_left = u - low > high - u;  // of the longer part
+    const bool is_left = u - low > high - u;  // the longer part
     const double other = is_left ? u - golden * (u - low) : u + golden * (high - u);
     const double there = sign * value(other);
     if (there < height) {
@@ -149,7 +149,7 @@ class SignSearch {
   static constexpr std::size_t points = BernsteinPolynomial::size;
   static constexpr int most_samples = 512, most_halvings = 10, most_piece_halvings = 30;
   static constexpr double epsilon = std::numeric_limits<double>::epsilon();
-  static constexpr double safety = 4;  // of errors that last coefficients tell: off by up to 1.3 were seen
+  static constexpr double safety = 4;  // errors of up to 1.3 times what the last coefficients tell were seen
   using Samples = BernsteinPolynomial::Numbers;
 
   /// A part of the step, and the values at its ends; `sign` is the certain sign of the last one.
@@ -205,7 +205,7 @@ class SignSearch {
     const BernsteinPolynomial polynomial = BernsteinPolynomial::through(values);
     const double tail = std::max(2 * (sizes[points - 2] + sizes[points - 1]), off_at_sixth(polynomial, interval, by));
     const double width = interval.to - interval.from;
-    const double whole = 1 / std::pow(width, static_cast<double>(degree_));  // from this part to the step
+    const double whole = 1 / std::pow(width, static_cast<double>(degree_));  // scales a coefficient to the whole step
     const double last_two = degree_ == 1 ? variation : std::max(sizes[degree_], sizes[degree_ - 1]);
     const double missed = by == By::polynomial ? missed_ + last_two * whole : 0;
     if (sizes[0] > variation + safety * (tail + missed)) return node(interval.to, interval.sign);
@@ -238,8 +238,8 @@ class SignSearch {
     is_measured_ = true;
   }
 
-  /// Replaces the true values at the ends of the step by those of dense output, whose coordinates are exact there and
-  /// whose rates are not; the difference measures its error.
+  /// Replaces the true values at the ends of the step by those of dense output. Its coordinates are exact there and its
+  /// rates are not; the difference measures its error.
   void take_ends(Samples& values) {
     values.front() = sample(0, By::polynomial);
     values.back() = sample(1, By::polynomial);

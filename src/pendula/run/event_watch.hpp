@@ -23,7 +23,8 @@ inline int dense_output_degree(const RunOptions& options) {
   return is_explicit(options.method) ? 3 : options.stages;
 }
 
-/// Cached states of a step: those that the search for every event begins with, and the last one; and bounds of all.
+/// Cached states of a step: those that the search for every event begins with, and the last one; and bounds of all
+/// states in the step.
 struct StepViews {
   struct View {
     double share = -1;
@@ -45,14 +46,14 @@ class StepStates;
 
 }  // namespace detail
 
-/// Finds and counts the events of a run step by step. The motion does not depend on it.
+/// Finds and counts the events of a run step by step. The motion does not depend on the search.
 class EventWatch {
  public:
   /// `degree` of dense output (SignSearch).
   EventWatch(std::vector<Event> events, int degree)
       : events_(std::move(events)), tallies_(events_.size()), sides_(events_.size()), degree_(degree) {}
 
-  /// For a change of the method.
+  /// Call where the method changes.
   void set_degree(int degree) { degree_ = degree; }
 
   const std::vector<Event>& events() const { return events_; }
@@ -65,7 +66,7 @@ class EventWatch {
     for (std::size_t k = 0; k < events_.size(); ++k) sides_[k] = side_at(events_[k], motion);
   }
 
-  /// Starts with the motion, and these signs; a value of the other sign is taken for rounding of 0.
+  /// The same with the signs of the functions given; a value of the other sign is taken for a rounded 0.
   void start(const Motion& motion, std::span<const int> signs) {
     start(motion);
     for (std::size_t k = 0; k < events_.size(); ++k) {

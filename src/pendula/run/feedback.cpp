@@ -17,7 +17,7 @@
 namespace pendula {
 namespace {
 
-/// A subject, what is added to its inputs, and its inputs without that.
+/// A subject, the laws and signals that are added to its inputs, and its own constant inputs.
 struct Fed {
   std::shared_ptr<const Subject> subject;
   std::vector<SampledLaw> laws;
@@ -68,8 +68,8 @@ struct Fed {
   }
 };
 
-/// Steps of a subject whose inputs are held from sample to sample, or are lines from knot to knot: from each of them on
-/// by a new integrator.
+/// Steps of a subject whose inputs are held from sample to sample, or are lines from knot to knot. At each sample or
+/// knot a new integrator takes over.
 class HeldInputs : public Relay {
  public:
   HeldInputs(const Fed& fed, const RunOptions& options)
@@ -101,7 +101,7 @@ class HeldInputs : public Relay {
   }
 
   std::span<const double> held(double time) const override {
-    // A row at 0.3 s is at the third sample of 0.1 s, although rounding puts it before that sample.
+    // A row at 0.3 s belongs to the third sample of 0.1 s, even if rounding puts it before that sample.
     return has_before() && time < now().time() * (1 - rounding) ? before_held_ : held_;
   }
 
@@ -186,7 +186,7 @@ class HeldInputs : public Relay {
       held_ = before_held_;
       return not_finite(at);
     }
-    if (held_ == before_held_ && !is_knot) return {};  // it goes on as it was
+    if (held_ == before_held_ && !is_knot) return {};  // the same integrator goes on
     knot_ = at;
     return hand_over(made(), motion);
   }
@@ -195,7 +195,7 @@ class HeldInputs : public Relay {
   const RunOptions options_;
   std::vector<double> held_, since_;  // of each law: its value, and the number of its last sample
   std::vector<double> made_for_, before_held_;
-  double knot_ = 0, made_at_ = 0;  // where signals have the lines that they have now
+  double knot_ = 0, made_at_ = 0;  // times of signals: of the present lines; of those of the integrator  [s]
   int rows_ = 0;                   // of tangents; 0 without derivatives
 };
 

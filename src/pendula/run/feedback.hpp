@@ -20,9 +20,9 @@ struct SampledLaw {
   double limit = std::numeric_limits<double>::infinity();  ///< the largest size of what is added
 };
 
-/// The subject with sampled feedback and signals: steps end where samples and knots are. Rows have the inputs as they
-/// are held from their time on. With feedback there are no derivatives of its motion, which jumps. Throws
-/// std::invalid_argument for an input that the subject does not have.
+/// The subject with sampled feedback and signals: steps end where samples and knots are. A row at a sample has the
+/// inputs that are held from there on. Motions with sampled feedback have no derivatives. Throws std::invalid_argument
+/// for an input that the subject does not have.
 std::shared_ptr<const Subject> with_feedback(std::shared_ptr<const Subject> subject, std::vector<SampledLaw> laws,
                                              std::vector<Signal> signals = {});
 

@@ -186,7 +186,7 @@ class FormulaSearch {
       const double noise = 64 * epsilon * largest_[n];
       double tail = 2 * (sizes[points - 2] + sizes[points - 1]), miss = 0;
       if (by == By::polynomial) {
-        const double whole = 1 / std::pow(fit.width(), static_cast<double>(degree_));  // from this part to the step
+        const double whole = 1 / std::pow(fit.width(), static_cast<double>(degree_));  // scales to the whole step
         tail = std::max(tail, std::abs(numbers_[n] - polynomial(odd_place)));
         if (sizes[degree_] > noise) last_[n] = std::max(last_[n], sizes[degree_] * whole);
         miss = missed_[n] + last_[n];
@@ -223,7 +223,7 @@ class FormulaSearch {
 
   // --- Sign changes ---
 
-  /// `roughness` is that of the wider fit before.
+  /// `roughness` is that of the wider fit that contains this interval.
   void search(double from, double to, By by, int level, double roughness) {
     Doubtful doubtful;
     search(from, to, by, level, roughness, doubtful);
@@ -231,8 +231,8 @@ class FormulaSearch {
   }
   void search(double from, double to, By by, int level, double roughness, Doubtful& doubtful) {
     Fit fit = fitted(from, to, by);
-    // Roughness that closer samples do not reduce is noise of states at full order, each by a step of its own. If all
-    // that is seen is noise, it says nothing about the sign.
+    // Roughness that closer samples do not reduce is noise: each state at full order comes from a step of its own.
+    // Where noise is as large as the variation, samples say nothing about the sign.
     const bool is_fine = by == By::full_order && fit.roughness < 1e-6;
     const bool is_noise = is_fine && fit.roughness > roughness / 4;
     if (is_noise || (is_fine && fit.is_blurred)) fit.roughness = 0;

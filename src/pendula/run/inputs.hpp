@@ -15,7 +15,7 @@ namespace pendula {
 /// Names of a subject's inputs; of a chain its torques, link by link: "torque_1", in space "torque_x_1".
 std::vector<std::string> input_names(const Subject& subject);
 
-/// Their constant parts.
+/// The constant parts of a subject's inputs.
 std::vector<double> inputs_of(const Subject& subject);
 
 /// A line that is added to an input for a time: slope (t - since).
@@ -39,10 +39,10 @@ struct Signal {
   std::vector<double> values;
   bool is_held = false;
 
-  /// A knot at 0.3 s is at the third sample of 0.1 s, too, although rounding may put that sample before it.
+  /// Times that differ by no more, relatively, are the same: the third sample of 0.1 s is at a knot at 0.3 s.
   static constexpr double rounding = 1e-12;
 
-  /// The knot that a time is at or comes after; −1 before the first one.
+  /// The last knot at or before a time; −1 if there is none.
   std::ptrdiff_t knot_before(double time) const {
     const double most = time + rounding * (time < 0 ? -time : time);
     return std::ranges::upper_bound(times, most) - times.begin() - 1;
@@ -61,7 +61,7 @@ struct Signal {
     return values[k] + slope_after(knot) * (time - times[k]);
   }
 
-  /// From a knot on; 0 before the first one and after the last.
+  /// The slope from a knot to the next; 0 before the first knot and after the last.
   double slope_after(std::ptrdiff_t knot) const {
     if (is_held || knot < 0 || knot + 1 >= std::ssize(times)) return 0;
     const auto k = static_cast<std::size_t>(knot);

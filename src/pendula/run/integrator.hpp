@@ -54,8 +54,8 @@ class Integrator : public StepView {
 
   double time() const override { return integrator_->time(); }
 
-  /// Whether the end of a run may change more than the last step: whether the limit that `step` is given, or was given
-  /// before, may affect the states on the way. A longer run would differ then.
+  /// Whether the limit `h` of the next step, or of an earlier one, may affect more than the last step of a run. If so,
+  /// a longer run has other states on the way.
   bool depends_on_end(double h) const { return integrator_->depends_on_end(h); }
 
   void read_state(Motion& motion) const override {
@@ -77,13 +77,13 @@ class Integrator : public StepView {
     return integrator_->bound_excursions(farthest.q.data(), farthest.v.data());
   }
 
-  /// The integrator is unchanged.
+  /// As StepView says. The integrator is unchanged.
   Outcome at_full_order(double time, Motion& motion) override {
     double work = 0;
     return at_full_order(time, motion, work);
   }
 
-  /// Also sets `work` to the work of loads until then  [J].
+  /// Also sets `work` to the work of loads up to `time`  [J].
   Outcome at_full_order(double time, Motion& motion, double& work) {
     make_room(time, motion);
     return integrator_->at_full_order(time, motion.q.data(), motion.v.data(), work);
@@ -202,7 +202,7 @@ class ScopedStopSign {
   StopSign before_;
 };
 
-/// The integrator for `options` from the compiled library for this processor (Integrator::step is told the step size).
+/// The integrator for `options` from the compiled library for this processor. The step size is given to its step().
 /// Throws NoKernel, naming the PENDULA_KERNELS to configure, if a dense kernel is needed that is not built in;
 /// std::invalid_argument for options that make no sense, and for a PENDULA_ARCH as library() does.
 template <class Space>

@@ -17,13 +17,12 @@ namespace pendula {
 struct Planar;
 struct Spatial;
 
-// The parts of the compiled library, and `const ProgramInterpreter*`, the functions of interpreted kernels
-// (system/interpreted_kernel.hpp). Those that a program does not ask for, -Wl,--gc-sections leaves out of it.
+// The parts of the compiled library. One more part is `const ProgramInterpreter*`, the functions of interpreted kernels
+// (system/interpreted_kernel.hpp). The linker leaves out parts that a program does not ask for (-Wl,--gc-sections).
 //
-// A program contains several compiled versions of each, with different flags; only what is declared here passes between
-// them and the program: numbers, pointers to numbers, and classes with virtual functions only. So it does not matter
-// how either was compiled. (The memory layout of Eigen's vectors, and who may free them, depend on flags such as
-// -mavx.)
+// A program contains several copies of each part, compiled with different flags. Only what is declared here passes
+// between the copies and the program: numbers, pointers to numbers, and classes with nothing but virtual functions.
+// Their layout does not depend on flags; the memory layout of Eigen's vectors, and who may free them, does (-mavx).
 
 /// Every method for chains of one space.
 template <class Space>
@@ -69,7 +68,7 @@ struct Orthonormalizer {
 template <class Part>
 Part library();
 
-/// That instruction set: "sse2", "avx2" or "avx512"; "baseline" if there is only one.
+/// The instruction set of these parts: "sse2", "avx2" or "avx512"; "baseline" if the build has only one.
 std::string_view instruction_set();
 
 /// The instruction set that a processor needs to run this build; empty if every processor of its kind can.

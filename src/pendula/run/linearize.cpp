@@ -16,7 +16,7 @@ namespace {
 
 using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
-/// One column for each coordinate, then one for each rate; as many at once as a kernel's functions take.
+/// Fills A column by column, `width` columns at once: by coordinates, then by rates.
 void find_a(SystemAt<8>& here, const Motion& motion, double* a) {
   constexpr std::size_t width = 8;
   const auto n = static_cast<std::size_t>(motion.q.size());
@@ -53,7 +53,7 @@ bool changes_with_time(const Subject& subject) {
   });
 }
 
-// Inputs stand in forces alone: M δa = δf.
+// Inputs change forces only: M δa = δf.
 void find_b(const SystemModel& model, const Motion& motion, double* b) {
   const Eigen::Index n = motion.q.size(), inputs = static_cast<Eigen::Index>(model.inputs());
   Eigen::Map<RowMajor> all(b, 2 * n, inputs);

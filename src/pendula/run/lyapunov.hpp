@@ -28,7 +28,7 @@ class TangentGrowth {
 /// The history of the growth of tangents, and the exponents that follow from it.
 class GrowthHistory {
  public:
-  /// Of `count` tangents, from the time 0 on.
+  /// The history of `count` tangents, from the time 0 on.
   explicit GrowthHistory(Eigen::Index count) : sums_(Eigen::VectorXd::Zero(count)) { entries_.push_back({0, sums_}); }
 
   /// Adds logarithms of the growth since the last entry.
@@ -90,7 +90,7 @@ class LyapunovTangents {
   /// Call after each step of `integrator`, to `time` since the start. Returns whether the history has a new entry.
   bool follow(Integrator& integrator, double time);
 
-  /// Adds the last entry of the history. Returns whether it was not there.
+  /// Adds the last entry of the history. Returns false if it was there already.
   bool finish();
 
   LyapunovProgress progress() const;
@@ -114,8 +114,8 @@ class LyapunovTangents {
 
 /// Runs `integrator` from `start` over `duration` in steps of at most `step`, which may be infinite if the method
 /// chooses its steps, and finds the `count` leading exponents of the motion, 0 for all. Calls `on_way` whenever
-/// tangents were made orthonormal, and at the end; asks `stop` after every step. Throws std::invalid_argument if there
-/// are fewer exponents, and for methods whose steps have no derivative.
+/// tangents were made orthonormal, and at the end; asks `stop` after every step. Throws std::invalid_argument if the
+/// motion has fewer than `count` exponents, and for methods whose steps have no derivative.
 LyapunovRun find_lyapunov_spectrum(Integrator& integrator, const Motion& start, double step, double duration, int count,
                                    const std::function<void(const LyapunovProgress&)>& on_way,
                                    const std::function<bool()>& stop);

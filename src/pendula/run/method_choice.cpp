@@ -13,12 +13,12 @@
 namespace pendula {
 namespace {
 
-constexpr int most_coordinates = 10;    // a generated kernel writes its series out up to there
-constexpr int always_few = 2, few = 3;  // links: of three, Gauss steps are the faster ones below fine_tolerance
+constexpr int most_coordinates = 10;    // generated kernels write their series out up to here
+constexpr int always_few = 2, few = 3;  // links; with three, Gauss steps are faster below fine_tolerance
 constexpr double fine_tolerance = 1e-10;
 constexpr double short_run = 100;  // steps
 
-/// Why a subject does not go by Taylor series: it has none, or Gauss steps take less time. Empty if it does.
+/// Why Taylor series are not chosen for a subject: it has none, or Gauss steps take less time. Empty if they may be.
 std::string against_series(const Subject& subject, double tolerance) {
   if (const auto* const system = dynamic_cast<const SystemSubject*>(&subject)) {
     if (system->table().of_1.series_next == nullptr) return "no series in the kernel";
@@ -35,8 +35,8 @@ std::string against_series(const Subject& subject, double tolerance) {
   return series_kernel<Planar>(links, true, false) == nullptr ? "no kernel for the number of links" : "";
 }
 
-/// Whether a motion is stiff at a state: damping there is much faster than all that swings or turns, and explicit steps
-/// have to follow it.
+/// Whether a motion is stiff at a state: damping is much faster there than all that swings or turns, so that it limits
+/// explicit steps.
 bool is_stiff(const Subject& subject, const Motion& place) {
   constexpr double much = 5;
   const Eigen::Index n = 2 * place.q.size();
@@ -51,8 +51,8 @@ bool is_stiff(const Subject& subject, const Motion& place) {
   return decay > much * pace;
 }
 
-/// Whether it is stiff at the start, or at a state that coarse steps come to: friction grows as rates fall, and a mass
-/// may run into a damper. A start at rest tells nothing: where a rod is level, nothing swings, and all damping is fast.
+/// Whether the motion is stiff at the start, or at a state that coarse steps reach: friction grows as rates fall, and a
+/// mass may run into a damper. A start at rest is not asked: a level rod does not swing, so any damping seems fast.
 bool becomes_stiff(const RunSetup& setup) {
   constexpr int most_steps = 256;
   const Subject& subject = *setup.subject;
@@ -71,7 +71,7 @@ bool becomes_stiff(const RunSetup& setup) {
   return is_stiff(subject, integrator->state());
 }
 
-/// The size of the first step; 0 if there is none.
+/// The size of the first step; 0 if it fails.
 double first_step(const RunSetup& setup, const RunOptions& options) {
   const auto integrator = setup.subject->make_integrator(options);
   if (!integrator->start(setup.start) || !integrator->step(setup.duration)) return 0;

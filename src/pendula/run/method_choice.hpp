@@ -12,14 +12,14 @@ struct MethodChoice {
 };
 
 /// The tolerance of a step for a motion with the tolerance `asked`: a hundredth of it, since the motion amplifies the
-/// errors of steps. For a run that is `longer` than a short one by some factor, it is smaller by that factor, too,
-/// since errors of the energy add up. It is rounded to a power of ten, so that runs of about the same length have the
-/// same one.
+/// errors of steps. Where `longer`, the length of the run over that of a short one, exceeds 1, the tolerance is divided
+/// by it, too, since errors of the energy add up. The divisor is rounded up to a power of ten, so that runs of about
+/// the same length have the same tolerance. No result is below `finest`.
 double step_tolerance(double asked, double longer, double finest);
 
-/// Whether a run that is set up for Gauss steps takes less time by Taylor series: of models and planar chains of few
-/// links, not long, not damped strongly, without forces that are narrow or depend on time. It depends on the setup
-/// alone.
+/// The choice for a run that is set up for Gauss steps. Taylor series take less time for models and planar chains of
+/// few links, if the run is not long, damping is not strong, and no force is narrow or depends on time. The choice
+/// depends on the setup alone.
 MethodChoice choose_method(const RunSetup& setup);
 
 }  // namespace pendula

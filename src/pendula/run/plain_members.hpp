@@ -11,8 +11,8 @@
 
 namespace pendula {
 
-/// The steps that members in lanes have just taken, for those who watch them. q and v are all the coordinates and their
-/// rates.
+/// The steps that members in lanes have just taken, as a MemberWatch sees them. q and v are all the coordinates and
+/// their rates.
 class MemberSteps {
  public:
   MemberSteps() = default;
@@ -28,16 +28,16 @@ class MemberSteps {
   virtual double begin(int lane) const = 0;
   virtual double end(int lane) const = 0;
 
-  /// Its current state.
+  /// The current state of the member.
   virtual void state(int lane, double* q, double* v) = 0;
-  /// Its state at the fraction `share` of the step, 0 to 1, by dense output; cheap if several lanes ask for the same
+  /// The state at the fraction `share` of the step, 0 to 1, by dense output; cheap if several lanes ask for the same
   /// share.
   virtual void at(int lane, double share, double* q, double* v) = 0;
   /// The same at the full order of the method, for a watch with wants_looks; false if the step there fails.
   virtual bool at_full_order(int lane, double share, double* q, double* v) = 0;
-  /// Logarithm of the growth of its tangent in the step; 0 if members have no tangents.
+  /// Logarithm of the growth of the member's tangent in the step; 0 if members have no tangents.
   virtual double growth(int lane) const = 0;
-  /// Ends its motion now.
+  /// Ends the motion of the member now.
   virtual void finish(int lane) = 0;
 };
 
@@ -49,7 +49,7 @@ class MemberWatch {
   MemberWatch& operator=(const MemberWatch&) = delete;
   virtual ~MemberWatch() = default;
 
-  /// Whether `after_step` is to be called: for the steps of all lanes together.
+  /// Whether `after_step` is to be called, once for the steps of all lanes.
   virtual bool wants_steps() const = 0;
   /// Whether `after_step` will ask for states at full order within steps (MemberSteps::at_full_order).
   virtual bool wants_looks() const = 0;

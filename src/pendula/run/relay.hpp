@@ -9,7 +9,7 @@
 
 namespace pendula {
 
-/// Steps by one integrator after another: where one ends the next one begins, for another system.
+/// Steps by one integrator after another: each continues where the last one ended, for another system.
 class Relay : public PlainIntegrator {
  public:
   double time() const override { return now_->time(); }
@@ -65,7 +65,7 @@ class Relay : public PlainIntegrator {
   bool has_before() const { return before_ != nullptr; }
   bool remembers() const { return remembers_; }
 
-  /// From now on the integrator of the last step is kept until the next one, as where steps are remembered.
+  /// From now on the integrator of the last step is kept until the next step, even if steps are not remembered.
   void keep_last() { keeps_last_ = true; }
   Integrator& last() { return before_ ? *before_ : *now_; }
 
@@ -82,15 +82,16 @@ class Relay : public PlainIntegrator {
     return now_->start(motion);
   }
 
-  /// Before a step.
+  /// Call before a step.
   void forget() { before_.reset(); }
-  /// After a step.
+  /// Call after a step, to sum the statistics.
   void count() {
     all_ = done_;
     all_ += now_->statistics();
   }
 
-  /// Goes on by another integrator after a step; rows and events may still ask for what that one did.
+  /// Continues with the integrator `next` from `motion`. The last one is kept where rows or events may look into its
+  /// step.
   Outcome hand_over(std::unique_ptr<Integrator> next, const Motion& motion) {
     before_work_ = done_.load_work;
     done_ = all_;
@@ -99,7 +100,7 @@ class Relay : public PlainIntegrator {
     return now_->start(motion);
   }
 
-  /// The numbers of the integrator itself come last.
+  /// Visits the numbers of the present integrator. Call last: others decide which integrator that is.
   void own_member(MemberNumbers& numbers) {
     const Member before = now_->member();
     Member own = before;
@@ -107,7 +108,7 @@ class Relay : public PlainIntegrator {
     if (own != before) now_->resume(own);
   }
 
-  Statistics done_, all_;  // of integrators before; of all
+  Statistics done_, all_;  // of earlier integrators; of all
 
  private:
   /// The integrator whose last step a time lies in: the one before, where the next one has just begun.

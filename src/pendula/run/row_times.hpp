@@ -11,7 +11,8 @@ namespace pendula {
 struct RowTimes {
   double interval = 0;        ///< between rows, the first at the start; 0: none
   std::vector<double> times;  ///< instead of an interval, ascending
-  /// Chosen by the program: the last state is a row, too, and a run that goes on keeps the rows that it began with.
+  /// Whether the program chose the times. Then the last state is a row, too, and a resumed run keeps the times that it
+  /// began with.
   bool chosen = false;
 
   bool any() const { return interval > 0 || !times.empty(); }

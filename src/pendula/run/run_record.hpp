@@ -90,7 +90,7 @@ class RunRecord {
         last_(std::move(start)),
         last_row_(empty_row()) {}
 
-  /// `row` holds the numbers of the trajectory; `work` is that of loads since the first row  [J].
+  /// `row` holds the numbers of the trajectory; `work` is the work of loads so far  [J].
   void add(const Motion& motion, const Observation& seen, const std::vector<double>& row, double work) {
     if (rows_++ == 0) start(seen, work);
     follow(seen, work);
@@ -142,12 +142,12 @@ class RunRecord {
 
  private:
   static constexpr std::size_t most_table_rows = 16;
-  // Fraction of |T| + |U|: smaller energies are lost in its rounding, by a thousandth and more.
+  // The scale is at least this fraction of |T| + |U|: smaller energies are lost in the rounding of that sum.
   static constexpr double rounding = 1e-10;
 
   TableRow empty_row() const { return {0, std::vector<double>(shown_.second), 0}; }
 
-  // The slack accepts a row whose time is at its place up to rounding.
+  // The slack 1e-6 accepts a row that rounding puts just before its place.
   void add_to_table(const TableRow& row) {
     const double place = interval_ > 0 ? std::floor(row.time / interval_ + 1e-6) : 0;
     if (place <= place_ || table_.size() == most_table_rows) return;

@@ -13,7 +13,7 @@ std::vector<std::size_t> state_columns(const Subject& subject) {
       if (quantity.role != role) continue;
       for (std::size_t k = 0; k < quantity.size(); ++k) columns.push_back(quantity.column(k));
     }
-    // Quantities gather the numbers of one name. Those of a system are in the order of its columns.
+    // A quantity gathers the columns of one name. The coordinates of a system are in the order of the columns.
     if (dynamic_cast<const SystemSubject*>(&subject) != nullptr) std::sort(columns.begin() + first, columns.end());
   }
   return columns;

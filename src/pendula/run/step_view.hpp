@@ -5,7 +5,7 @@
 
 namespace pendula {
 
-/// The last step of something that moves, for all that looks into steps: events, rows between steps, tracks.
+/// The last step of a motion, for all that needs states within it: events, rows between steps, tracks.
 class StepView {
  public:
   StepView() = default;
@@ -21,16 +21,17 @@ class StepView {
   /// the number of stages for positions, that number for rates.
   virtual void at(double time, Motion& motion) = 0;
 
-  /// The same where the share of the step that is done then, 0 to 1, is known: what motions side by side ask for by the
-  /// same share is found for all of them at once.
+  /// The same, where `share`, the fraction of the step done at `time`, is known. States of members in lanes are found
+  /// for all of them at once if they ask for the same share.
   virtual void at(double /*share*/, double time, Motion& motion) { at(time, motion); }
 
   /// The state at `time` at the full order of the method: by a step from where the last one began. `motion` is set if
   /// the outcome is ok.
   virtual Outcome at_full_order(double time, Motion& motion) = 0;
 
-  /// Bounds of how far coordinates and rates get, anywhere in the step, from where it began: cheaper than by dense
-  /// output. Returns whether they are known; `farthest` has the right size.
+  /// Sets `farthest` to bounds of how far each coordinate and rate gets from its value at the start of the step, for
+  /// rates of Gauss steps from the stage polynomial's rate there. Cheaper than dense output. False if they are not
+  /// known. The caller gives vectors of the right size.
   virtual bool bound_excursions(Motion& /*farthest*/) const { return false; }
 
   Motion state() const {

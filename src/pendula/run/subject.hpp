@@ -27,10 +27,10 @@ struct Observation {
   double potential() const { return energy - kinetic; }
 };
 
-/// A column that somebody asked for.
+/// A column that the user defines.
 struct OwnColumn {
   std::string name, meaning;
-  /// A function of the columns before; several threads may call it.
+  /// A function of the columns that a row has without own ones; several threads may call it.
   std::function<double(std::span<const double> row)> value;
 };
 
@@ -49,7 +49,7 @@ class Subject {
 
   /// Scale of energy errors  [J]; nothing if it is known only from the motion.
   virtual std::optional<double> energy_scale() const = 0;
-  /// Whether the energy may change by loads or inputs, and whether damping may take some.
+  /// Whether loads or inputs may change the energy; whether damping may.
   virtual bool loaded() const = 0;
   virtual bool damped() const = 0;
   /// Whether the energy is known at all times: it is conserved, or all work is summed.
@@ -68,7 +68,7 @@ class Subject {
     return quantities;
   }
 
-  /// The numbers of one row. Without points and energy, of an empty observation, there are no own columns either.
+  /// Appends the numbers of one row. If the observation is empty, points, energy and own columns are left out.
   void append_row(const Motion& motion, const Observation& seen, std::vector<double>& row) const {
     const std::size_t first = row.size();
     append_motion_row(motion, seen, row);
@@ -88,8 +88,8 @@ class Subject {
     return nullptr;
   }
 
-  /// The subject that moves this one around a time, where signals add lines to inputs. Null where this one moves
-  /// itself, and for sampled feedback.
+  /// A subject without signals whose equations are those of this one around a time, where signals add lines to inputs.
+  /// Null if this one has no signals, and for sampled feedback.
   virtual std::shared_ptr<const Subject> part_at(double /*time*/) const { return nullptr; }
 
   /// The columns of inputs that feedback or signals add to.
@@ -106,7 +106,8 @@ class Subject {
 
   /// Switching functions of a system with functions of several pieces.
   virtual std::span<const std::string_view> switches() const { return {}; }
-  /// The switching function that drives a motion away on both sides where it starts.
+  /// A switching function that is zero at the start and drives the motion away on both sides, if there is one: then the
+  /// equations do not tell which way it goes.
   virtual std::optional<std::size_t> fork(const Motion& /*start*/) const { return {}; }
 
   /// The columns of a short table: index of the first, and how many.
@@ -129,7 +130,7 @@ class Subject {
   std::size_t motion_columns_ = 0;
 };
 
-/// The same subject with own columns, in place of those that it has.
+/// The same subject with these own columns in place of its present ones.
 inline std::shared_ptr<const Subject> with_columns(const std::shared_ptr<const Subject>& subject,
                                                    std::vector<OwnColumn> own) {
   if (own.empty()) return subject;

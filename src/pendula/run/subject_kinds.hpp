@@ -31,7 +31,7 @@ auto as_its_kind(const Subject& subject, Act act) {
   throw std::invalid_argument(subject.part_at(0) ? signals_are_not_here : sampled_has_no_derivatives);
 }
 
-/// The same with the subject that moves it around a time (Subject::part_at).
+/// The same, with Subject::part_at the time in place of a subject that has one.
 template <class Act>
 auto as_its_kind_at(const Subject& subject, double time, Act act) {
   const std::shared_ptr<const Subject> part = subject.part_at(time);
@@ -55,7 +55,7 @@ inline SystemModel system_model_of(const SystemSubject& subject) {
   return {subject.table(), subject.numbers().plain()};
 }
 
-/// Of a subject with functions of several pieces by those that a motion takes.
+/// The system of a subject. Functions of several pieces are on the pieces that `motion` takes.
 inline SystemModel system_model_of(const SystemSubject& subject, const Motion& motion) {
   return {subject.table(), subject.numbers_at(motion).plain()};
 }

@@ -17,11 +17,11 @@
 
 namespace pendula {
 
-/// Which pieces of its functions a system moves by: of each switching function its side, +1 or −1.
+/// The side of each switching function, +1 or −1. Sides say which pieces of its functions a system moves by.
 using Sides = std::vector<int>;
 
-/// A system with functions of several pieces: between the zeros of its switching functions g it is smooth, and moves by
-/// the parameters that belong to their sides.
+/// A system with functions of several pieces. Between the zeros of its switching functions g the system is smooth: the
+/// sides of g stand among its parameters.
 class SwitchingSystem {
  public:
   /// The table must outlive it.
@@ -30,17 +30,17 @@ class SwitchingSystem {
   const SystemTable& table() const { return *table_; }
   std::size_t switches() const { return table_->info.switches.size(); }
 
-  /// Its numbers where these pieces are taken.
+  /// The numbers of the system on these sides.
   SystemNumbers numbers(const Sides& sides) const;
 
-  /// The values of g by these pieces. A switching function may depend on the pieces itself.
+  /// The values of g on these sides: a switching function may have pieces itself.
   std::vector<double> values(const Sides& sides, const Motion& motion) const;
 
   /// The arguments of the functions that may change fast, without bases of powers (field_look.hpp).
   std::vector<double> fast_arguments(const Sides& sides, const Motion& motion) const;
 
-  /// The sides on which a motion goes on, which at zeros of g depends on where it goes. Both may drive it back to one
-  /// of the zeros: it cannot leave it.
+  /// The sides on which a motion goes on. At zeros of g they depend on where the motion goes. If all sides drive it
+  /// back to a zero, it cannot leave: stuck_at.
   struct Way {
     Sides sides;
     std::optional<std::size_t> stuck_at;
@@ -51,10 +51,10 @@ class SwitchingSystem {
   /// it goes.
   std::optional<std::size_t> fork(const Motion& motion) const;
 
-  /// A time in which the motion changes  [s].
+  /// The time scale of the motion, speed over acceleration  [s].
   double pace(const Sides& sides, const Motion& motion) const;
 
-  /// All ways to choose sides, or many of them.
+  /// All combinations of sides, or 64 of them where there are more.
   std::vector<Sides> all_sides() const;
 
  private:
@@ -120,7 +120,7 @@ inline Sides SwitchingSystem::sides_at(const Motion& motion) const {
   return sides;
 }
 
-/// The switching functions that are zero to rounding: they change by more within a moment.
+/// The switching functions that are zero to rounding: 1e-10 of the time scale changes them by more than their value.
 inline std::vector<std::size_t> SwitchingSystem::zeros(const Sides& sides, const Motion& motion) const {
   constexpr std::size_t most_at_once = 8;
   constexpr double moment = 1e-10;
@@ -174,7 +174,7 @@ inline int SwitchingSystem::drift(std::size_t k, const Sides& sides, const Motio
       return values(sides, ahead(sides, motion, share * moment * whole))[k] - now;
     };
     const double half = change(0.5), all = change(1);
-    // Smooth, and no mere rounding.
+    // The change is smooth, not mere rounding.
     if (half * all > 0 && std::abs(all) > 1.5 * std::abs(half) && std::abs(all) < 5 * std::abs(half)) {
       return (all > 0 ? 1 : -1);
     }

@@ -23,9 +23,9 @@ namespace pendula {
 
 namespace {
 
-/// Whether a motion switches ever faster and ever closer to where it switches, without end: a preloaded detent with a
-/// viscous damper does, whose n-th swing takes 1/n as long and gets 1/n² as far. Switchings are counted in blocks, each
-/// as many as all before it.
+/// Tells whether a motion switches ever faster and ever closer to its switching points, without end. A preloaded detent
+/// with a viscous damper does: its n-th swing takes 1/n as long and gets 1/n² as far. Switchings are counted in blocks,
+/// each as many as all before it.
 class PileUp {
  public:
   void begin(double time, std::size_t functions) {
@@ -121,7 +121,7 @@ class SwitchingIntegrator : public Relay {
         continue;
       }
       limit_ = is_adaptive(options_) || most < h ? growth * taken : unlimited;
-      // The place where a function is zero is known to rounding, and another step is rounded otherwise.
+      // A zero is known to rounding, and rounding depends on the step: so does the state from here on.
       const std::optional<std::size_t> zero = first ? std::nullopt : zero_at_end();
       if ((first || zero) && is_adaptive(options_) && taken >= h * (1 - 1e-9)) is_of_end_ = true;
       if (first) return finish(cut(before, begin, time(), *first));
@@ -176,7 +176,7 @@ class SwitchingIntegrator : public Relay {
 
   Outcome stuck() const { return {.status = Status::stuck_at_switch, .time = time(), .part = stuck_at_}; }
 
-  /// The first limit of chosen steps. They grow from there, so that they do not depend on where the run ends.
+  /// The first limit of adaptive steps. It grows from step to step, and does not depend on where the run ends.
   double first_limit(const Motion& motion) const {
     return is_adaptive(options_) ? 4 * system_.pace(sides_, motion) : unlimited;
   }
@@ -189,7 +189,7 @@ class SwitchingIntegrator : public Relay {
   /// unseen: one that holds a fast sine may do so in the long steps of a slow motion.
   bool is_resolved(double begin) {
     constexpr double near = 0.02;                                            // of the variation
-    constexpr std::array<double, 4> others{0.0713, 0.2887, 0.5641, 0.8329};  // where nobody looks
+    constexpr std::array<double, 4> others{0.0713, 0.2887, 0.5641, 0.8329};  // apart from the nodes
     const auto values_at = [&](double u) {
       return system_.values(sides_, now().at(u == 1 ? time() : begin + u * (time() - begin)));
     };
@@ -214,8 +214,8 @@ class SwitchingIntegrator : public Relay {
     return true;
   }
 
-  /// Whether functions such as exp and tanh, which the switching functions may hold, change little in the last step:
-  /// what is narrow might lie between all places that are looked at.
+  /// Whether the arguments of functions such as exp and tanh change little in the last step. Otherwise a narrow change
+  /// of a switching function might lie between all samples.
   bool is_slow(double begin) {
     constexpr double little = 8;
     std::array<std::vector<double>, BernsteinPolynomial::size> seen;
@@ -237,12 +237,12 @@ class SwitchingIntegrator : public Relay {
     return (1 - std::cos(std::numbers::pi * static_cast<double>(i) / (points - 1))) / 2;
   }
 
-  /// Whether the search for zeros in the last step has found out all of them.
+  /// Whether the search for zeros in the last step resolved the switching functions.
   bool is_told(double begin) const {
     return std::ranges::none_of(watch_.tallies(), [&](const EventTally& tally) { return tally.not_told > begin; });
   }
 
-  /// The first one in the last step.
+  /// The first zero in the last step.
   std::optional<Occurrence> crossing() {
     const ScopedStopSign none(now(), {});
     std::vector<Occurrence> found = watch_.after_step(now());
@@ -258,10 +258,10 @@ class SwitchingIntegrator : public Relay {
     return static_cast<std::size_t>(zero - values.begin());
   }
 
-  /// Half way through the last step.
+  /// Tells pile_ the switching functions half way through the last step.
   void see_reach(double begin) { pile_.reach(system_.values(sides_, now().at((begin + time()) / 2))); }
 
-  /// Takes the step again, to where a switching function is zero, and some roundings on, so that it has its new sign.
+  /// Takes the step again, to the zero of a switching function, and a few roundings on, until it has its new sign.
   Outcome cut(const Member& before, double begin, double end, const Occurrence& first) {
     const double at = first.motion.time;
     const double rounding = rounding_of(at, end - begin);
@@ -283,7 +283,7 @@ class SwitchingIntegrator : public Relay {
     return stepped;
   }
 
-  /// Goes on after a step to a zero, by the pieces that the motion takes from there.
+  /// Goes on after a step to a zero, on the sides that the motion takes from there.
   Outcome go_on(const Outcome& stepped, std::size_t switched) {
     count();
     const Motion motion = now().state();
@@ -313,7 +313,7 @@ class SwitchingIntegrator : public Relay {
 
   static constexpr int most_tries = 40;
   static constexpr double growth = 8;       // of chosen steps, from one to the next
-  static constexpr double shorter = 0.4;    // no half: runs by steps twice as long would come to the same ones
+  static constexpr double shorter = 0.4;    // not 0.5: runs with steps twice as long would take the same ones
   static constexpr double longest_ = 1e-3;  // s
   static constexpr std::size_t points = 17;
   static constexpr double unlimited = std::numeric_limits<double>::infinity();
@@ -325,7 +325,7 @@ class SwitchingIntegrator : public Relay {
   std::int64_t switchings_ = 0;
   double limit_ = unlimited;  // of the next step  [s]
   bool is_of_end_ = false;    // whether the end of the run has affected the state
-  double burst_ = 0;          // when the last hundred of them began
+  double burst_ = 0;          // when the last hundred switchings began  [s]
   PileUp pile_;
   EventWatch watch_;
 };

@@ -16,7 +16,7 @@
 
 namespace pendula {
 
-/// Continuous feedback. A kernel has it among its forces; rows add its value to the input.
+/// Continuous feedback. It is part of the forces of a kernel; rows add its value to the input.
 struct InputFunction {
   std::size_t input;
   std::function<double(const Motion&)> value;
@@ -63,7 +63,7 @@ class SystemSubject : public Subject {
     return switches().empty() ? std::nullopt : switching().fork(start);
   }
 
-  /// The same numbers with those of the pieces that a motion takes.
+  /// The numbers of the system, on the pieces that a motion takes.
   SystemNumbers numbers_at(const Motion& motion) const {
     return switches().empty() ? numbers_ : switching().numbers(switching().way(motion).sides);
   }
@@ -102,7 +102,7 @@ class SystemSubject : public Subject {
     return v;
   }
 
-  /// Whether momenta have rates at time 0: not where the mass matrix is singular.
+  /// Whether the mass matrix is regular at time 0.
   bool has_inertia(const Eigen::VectorXd& q) const { return rates(0, q, Eigen::VectorXd::Ones(q.size())).allFinite(); }
 
   std::optional<double> energy_scale() const override { return std::nullopt; }

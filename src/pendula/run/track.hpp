@@ -16,8 +16,8 @@
 
 namespace pendula {
 
-/// The ends of the steps in which a motion changes fastest, one of each stretch of a run: there an error in time shows
-/// most.
+/// States where a motion changes fastest, because an error in time shows most there: the end of the fastest step of
+/// each stretch of a run.
 class FastPlaces {
  public:
   void begin(const Motion& start, std::size_t most) {
@@ -88,12 +88,13 @@ class FastPlaces {
 /// the fastest, or at the times of another track.
 class Track {
  public:
-  /// Number of steps between kept states of a long run. It is even, and a multiple of three, so that steps of twice or
-  /// three times the length end there, too.
+  /// Number of steps between kept states of a long run. It is a multiple of 6, so that steps of twice or three times
+  /// the length end there, too.
   static constexpr std::int64_t apart = 6;
 
-  /// Keeps the states after each of the first steps, in which stiff components decay, and after every `every` later
-  /// ones, `apart` for constant steps. Long runs are thinned to at most `most_numbers` numbers, about 64 MB by default.
+  /// Keeps the states after each of the first steps, in which stiff components decay, and then after each `every`
+  /// steps; give `apart` for constant steps. Long runs are thinned to at most `most_numbers` numbers, about 64 MB by
+  /// default.
   explicit Track(std::int64_t every, std::size_t most_numbers = std::size_t{1} << 23)
       : most_numbers_(most_numbers), every_(every) {}
 
@@ -103,8 +104,8 @@ class Track {
     return std::move(*this);
   }
 
-  /// Looks into steps by dense output alone, and so do tracks that are made of this one: of many motions at once,
-  /// where looks at full order take too long.
+  /// Finds states within steps by dense output, and so do tracks that are made of this one. For many motions at once
+  /// full order takes too long.
   Track&& by_dense_output() && {
     is_dense_output_ = true;
     return std::move(*this);
@@ -118,8 +119,8 @@ class Track {
     return track;
   }
 
-  /// The same with fastest places of its own, without those of the tracks that `other` was made of: there are never
-  /// more than of two tracks.
+  /// The same, with fastest places of its own. The times have the fastest places of `other`, but not those of the
+  /// tracks that `other` was made of.
   static Track beside(const Track& other) {
     Track track(0);
     track.is_dense_output_ = other.is_dense_output_;
@@ -158,7 +159,7 @@ class Track {
     }
   }
 
-  /// Adds a row within a step, which may have an error that the step has not. Very many rows are thinned.
+  /// Adds a row within a step: its dense output may have an error that the step has not. Very many rows are thinned.
   void add_row(const Motion& row) {
     if (looks() || ++all_rows_ % every_row_ != 0) return;
     rows_.push_back(row);
@@ -191,8 +192,8 @@ class Track {
   const Motion& last() const { return last_; }
 
  private:
-  // Most rows, states of a run of few steps, states of any run at least, fastest places; numbers that a state takes
-  // besides its own.
+  // Limits: of rows, of states of a run with few steps, the least of any run, of fastest places. The last counts the
+  // memory of a state besides its numbers.
   static constexpr std::size_t most_rows = 256, few = 64, least = 12, most_fast = 48, numbers_besides = 24;
 
   std::size_t most_for(const Motion& start) const {
@@ -230,7 +231,7 @@ class Track {
   std::size_t most_ = few;
   bool has_fast_places_ = false, is_dense_output_ = false;
   FastPlaces places_;
-  std::vector<double> times_, common_, fast_;  // to look at; of tracks alike; of the own fastest places
+  std::vector<double> times_, common_, fast_;  // to take states at; without fastest places; of own fastest places
   std::vector<Motion> states_;
   std::vector<std::int64_t> numbers_;  // of the steps that ended at the states
   std::int64_t all_rows_ = 0, every_row_ = 1;
@@ -279,7 +280,7 @@ class Separation {
     }
   }
 
-  /// From now on the two do not part up to `time`, where it is known otherwise how far they do.
+  /// Sets the distances up to `time` to 0: they are known otherwise.
   void forget_until(double time) {
     const auto later = std::ranges::find_if(places_, [&](const DistanceAt& place) { return place.time > time; });
     for (auto place = places_.begin(); place != later; ++place) place->off = 0;

@@ -15,8 +15,8 @@
 namespace pendula {
 
 /// Passes rows to an observer at times of its own, independent of the rows of the run, as an animation needs. The last
-/// state is a row, too. It looks into steps (Integrator::remember_steps); neither the steps nor the rows of the run
-/// depend on that.
+/// state is a row, too. Steps have to be remembered (Integrator::remember_steps); neither they nor the rows of the run
+/// depend on a viewer.
 class Viewer {
  public:
   Viewer(const Subject& subject, Observer& observer, RowTimes times)
@@ -49,7 +49,7 @@ class Viewer {
   }
 
  private:
-  // A state that is not finite ends the run elsewhere.
+  // A state that is not finite is left out; the run itself ends by it.
   void show(const Motion& motion) {
     const Observation seen = subject_->observe(motion);
     if (!std::isfinite(seen.energy)) return;

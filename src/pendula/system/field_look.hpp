@@ -56,7 +56,7 @@ class FieldLook {
   /// Whether the model has functions that may change within a short time.
   bool has_to_look() const { return !is_base_.empty(); }
 
-  /// Whether a few samples show that one of them may change fast. arguments(shares, found) writes the arguments of the
+  /// Whether a few samples show that a function may change fast. arguments(shares, found) writes the arguments of the
   /// model's functions, (shares, arguments).
   template <class Arguments>
   bool may_find(Arguments&& arguments) {
@@ -69,7 +69,8 @@ class FieldLook {
     return false;
   }
 
-  /// Whether one of them changes faster than the samples of the step show.
+  /// Searches for places where a function changes faster than the samples of the step show. Returns whether there are
+  /// any; the functions below use them.
   template <class Arguments>
   bool finds(Arguments&& arguments) {
     places_.clear();
@@ -80,7 +81,7 @@ class FieldLook {
     return !places_.empty();
   }
 
-  /// Whether holds(share) is true at places so dense that nothing of what was found lies between them.
+  /// Whether holds(share) is true at nodes that are dense around all found places.
   template <class Holds>
   bool holds_at_nodes(Holds&& holds) {
     find_borders();
@@ -96,8 +97,8 @@ class FieldLook {
     return true;
   }
 
-  /// Integrals over the step of several quantities, where something was found, and how much of them is missed by nodes
-  /// about twice as dense as those of the method.
+  /// Integrals of several quantities over the step, with nodes that are dense around the found places; and what nodes
+  /// about twice as dense as those of the method miss of them.
   ///   sums     ∫₀¹ quantity
   ///   moments  ∫₀¹ (1 − share) quantity: for accelerations, the displacement they cause
   ///   missed   the largest |∫ (quantity − polynomial through nodes)| from the start of a part of the step to anywhere
@@ -106,7 +107,7 @@ class FieldLook {
     std::span<double> sums, moments, missed;
   };
 
-  /// Computes them. numbers(shares, found) writes the quantities, (shares, sums.size()).
+  /// Computes these integrals. numbers(shares, found) writes the quantities, (shares, sums.size()).
   template <class Numbers>
   void sum(Numbers&& numbers, const Sums& into) {
     find_borders();
@@ -169,7 +170,7 @@ class FieldLook {
       zoom(a, 0, samples_[i], samples_[i + 1], arguments);
     }
     if (!changes(a, here, before, smooth_) && !changes(a, here, after, smooth_)) return;
-    // Between samples an argument may go further than at them, by its curvature.
+    // By its curvature an argument may go further between samples than at them.
     const std::size_t middle = std::clamp(i, std::size_t{1}, last - 1);
     const double bend = std::abs(at(middle - 1, a) - 2 * at(middle, a) + at(middle + 1, a));
     const double reach = std::max(std::abs(here - before), std::abs(here - after)) + bend / 4;

@@ -81,7 +81,7 @@ class ForcingLook {
   /// estimate of the step. Forces that are not smooth on that scale jump, or are mere differences of large numbers,
   /// such as 1 + tanh(t) long before t = 0.
   static constexpr double finest = 1e-3;
-  static constexpr int least_parts = 8;      ///< that a step is divided into
+  static constexpr int least_parts = 8;      ///< a step is divided into at least so many
   static constexpr double invisible = 1e-3;  ///< fraction of a rounding error: forces are rounded by as much themselves
   static constexpr double rounding = 8 * std::numeric_limits<double>::epsilon();  ///< relative, of sums and times
   static constexpr double negligible = 1e-280;  ///< speed; smaller numbers lose digits
@@ -149,7 +149,7 @@ class ForcingLook {
 
   std::vector<double> nodes_, weights_;
   Sums coarse_, fine_;
-  std::vector<double> speeds_, least_speeds_;  // that errors are relative to, and their lower bounds
+  std::vector<double> speeds_, least_speeds_;  // errors are relative to these speeds; lower bounds of them
   std::vector<double> times_, found_;
 };
 

@@ -226,7 +226,7 @@ using Rows = std::vector<double, detail::PackAllocator<double>>;
 
 constexpr std::size_t order = 10;
 constexpr double share = 0.05;  // of the radius of convergence: terms beyond the order are below 1e-11
-constexpr int nearer = 3;       // times, each an eighth of the one before: what is narrow and ahead is not met at all
+constexpr int nearer = 3;       // times, each an eighth of the last: the nearest comes before any narrow force ahead
 
 /// The series of W motions from points.
 template <std::size_t W>
@@ -267,7 +267,7 @@ class Series {
     functions.series_next(there, rows, 1, order);
   }
 
-  /// Of the motion in a lane, the smallest of several times; NaN where it has no numbers.
+  /// The error of the motion in a lane: the smallest of those at several times; NaN if none is a number.
   double error(std::size_t lane) const {
     double radius = std::numeric_limits<double>::infinity();
     for (std::size_t i = 0; i < n_; ++i) {
@@ -277,7 +277,7 @@ class Series {
         if (term > 0) radius = std::min(radius, std::pow(term, -1 / static_cast<double>(k)));
       }
     }
-    if (std::isinf(radius)) radius = 1;  // where nothing but the start moves it
+    if (std::isinf(radius)) radius = 1;  // all terms are zero: nothing acts
     double least = std::numeric_limits<double>::quiet_NaN(), time = share * radius;
     for (int k = 0; k < nearer; ++k, time /= 8) least = std::fmin(least, error(lane, time, radius));
     return least;

@@ -122,8 +122,8 @@ class KernelSeries : KernelNumbers<S, W> {
     }
   }
 
-  /// Sums of one motion. The terms of orders 1 and k − 1 are added one by one: registers cannot be read yet where their
-  /// numbers were just written so. `last` are the operands of the order before.
+  /// Sums of one motion. The terms with operands of order k − 1 are added one by one, from `last`: a whole register of
+  /// them cannot be loaded yet, because they were just stored one by one.
   template <class Last, class Sums>
   [[gnu::always_inline]] static void sums_of_one(const double* operands, std::size_t k, const Last& last, Sums& sums) {
     constexpr std::size_t lanes = series_lanes(info), count = S::series_sums.size();
@@ -139,7 +139,7 @@ class KernelSeries : KernelNumbers<S, W> {
     }
   }
 
-  /// The operands of the order before the first one.
+  /// Sets `last` to the operands of order first − 1.
   template <class Last>
   static void found_before(const double* operands, std::size_t first, Last& last) {
     if (first == 1) return;

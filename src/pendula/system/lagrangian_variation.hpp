@@ -10,8 +10,8 @@
 
 namespace pendula {
 
-/// The tangent space at one state of a system, between the coordinates that steps are differentiated in, (δq, δp), and
-/// those of users, (δq, δv), both (2 coordinates x any). Where parameters vary, too, by (parameters x as many),
+/// Converts tangents at one state of a system between the coordinates of derivatives of steps, (δq, δp), and those of
+/// users, (δq, δv), both (2 coordinates x any). Where parameters vary, too, by (parameters x as many),
 ///   δp = ∂p/∂q δq + ∂p/∂v δv + ∂p/∂θ δθ.
 class LagrangianVariation {
  public:

@@ -59,8 +59,8 @@ class MassScale {
     see();
   }
 
-  /// Room for mass matrices  (coordinates, coordinates, members), and the update from what is in there, which it
-  /// overwrites.
+  /// numbers() is room for mass matrices  (coordinates, coordinates, members). see() updates from these, and overwrites
+  /// them.
   double* numbers() { return mass_[0]; }
   void see() {
     for (std::size_t k = 0; k < count(); ++k) inertia_[k] = mass(k, k);
@@ -87,7 +87,7 @@ class MassScale {
   /// Whether the inertia of coordinate k is far below its largest value.
   Mask is_small(std::size_t k) const { return constant_ ? Num(1.0) < Num(0.0) : pivot_[k] < Num(small) * largest_[k]; }
 
-  /// Whether a coordinate has lost more than half of its digits; for one motion also which, −1 for none.
+  /// Whether the pivot of a coordinate has almost vanished; singular() returns which coordinate, −1 for none.
   Mask is_singular() const { return singular_ > Num(0.0); }
   int singular() const requires(!is_batch<Num>) {
     std::size_t k = 0;

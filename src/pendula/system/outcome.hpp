@@ -16,7 +16,7 @@ namespace pendula {
 enum class Status {
   ok,
   not_converged,         ///< the stage equations were not solved to round-off
-  wrong_root,            ///< they were solved, but not by the motion: its energy does not balance
+  wrong_root,            ///< the stage equations have a solution that is not the motion: its energy does not balance
   tolerance_not_met,     ///< an explicit method reduced its step to the minimum
   not_finite,            ///< a value became infinite or NaN
   singular_mass_matrix,  ///< a coordinate is undefined: φ in (θ, φ) where sin θ = 0
@@ -124,13 +124,12 @@ inline std::ostream& operator<<(std::ostream& out, const Outcome& outcome) {
   return out << message(outcome);
 }
 
-/// What a step misses between its stages, relative to the speed of the motion.
+/// What a step misses of forces between its stages, relative to the speed of the motion.
 struct Unseen {
   double impulse = 0;  ///< the largest missed impulse, to anywhere in the step
   double effect = 0;   ///< on the state at the end of the step
 
-  /// The impulse if it is large enough for a wall, else 0. It is relative to the speed there: a wall that takes up half
-  /// of the speed reflects the motion.
+  /// The impulse if it may be that of a wall, else 0: one that takes half of the speed there reflects the motion.
   static constexpr double of_wall(double impulse) { return impulse > 0.4 ? impulse : 0; }
 };
 
@@ -146,7 +145,7 @@ struct Statistics {
   /// rows show them  [s].
   double unseen = 0, unseen_from = std::numeric_limits<double>::infinity();
 
-  /// Counts a step whose size the method chose.
+  /// Counts an adaptive step.
   void count_chosen(double h) {
     smallest_step = smallest_step == 0 ? h : std::min(smallest_step, h);
     largest_step = std::max(largest_step, h);

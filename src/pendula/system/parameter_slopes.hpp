@@ -8,8 +8,8 @@
 
 namespace pendula {
 
-/// What a system's momenta and forces change by where its parameters and inputs vary, exactly: its kernel in dual
-/// numbers, several variations at once. They are numbered as SystemInfo's parameters and then its inputs are.
+/// Exact derivatives of a system's momenta and forces with respect to its parameters, then its inputs, in the order of
+/// SystemInfo: by its kernel in dual numbers, several variations at once.
 class ParameterSlopes {
  public:
   explicit ParameterSlopes(const SystemModel& model)
@@ -25,7 +25,7 @@ class ParameterSlopes {
 
   Eigen::MatrixXd p, f;  ///< ∂p/∂θ, ∂f/∂θ at given q and v, a column a parameter or input
 
-  /// q, v: (coordinates) numbers, each so far `apart` from the one before.
+  /// Computes p and f. q, v: (coordinates) numbers, each `apart` numbers after the one before.
   void evaluate(double time, const double* q, const double* v, std::size_t apart = 1) {
     const auto count = static_cast<std::size_t>(p.rows()), variations = static_cast<std::size_t>(p.cols());
     at_.set_time(time);

@@ -25,11 +25,11 @@ class PlainIntegrator {
   virtual Outcome step(double h) = 0;
   virtual double time() const = 0;
   virtual void read_state(double* q, double* v) const = 0;
-  /// What is held of inputs at a time in the last step; empty but for sampled feedback.
+  /// The values that sampled feedback holds at a time in the last step; empty without such feedback.
   virtual std::span<const double> held(double /*time*/) const { return {}; }
 
-  /// Whether the end of a run may change more than the last step: whether the limit that `step` is given, or was given
-  /// before, may affect the states on the way. A longer run would differ then.
+  /// Whether the limit `h` of the next step, or of an earlier one, may affect more than the last step of a run. If so,
+  /// a longer run has other states on the way.
   virtual bool depends_on_end(double /*h*/) const { return false; }
 
   /// Whether to remember steps from now on, so that at and at_full_order can go back into the last one; this costs a
@@ -38,8 +38,8 @@ class PlainIntegrator {
   /// The state at `time` within the last step by dense output, polynomials through what the step has computed: cheap,
   /// but less accurate.
   virtual void at(double time, double* q, double* v) = 0;
-  /// Bounds of how far each coordinate and rate gets, anywhere in the last step, from where it was when the step began:
-  /// cheaper than by dense output. Whether they are known.
+  /// Sets q and v to bounds of how far each coordinate and rate gets from its value at the start of the last step.
+  /// Cheaper than dense output. False if they are not known. See StepView::bound_excursions.
   virtual bool bound_excursions(double* /*q*/, double* /*v*/) const { return false; }
   /// The state at `time` within the last step at the full order of the method: takes a step from where the last one
   /// began. The integrator is left unchanged. `work` is set to the work of loads until then  [J].

@@ -49,22 +49,22 @@ struct SystemInfo {
   std::span<const std::string_view> inputs, input_units;
   std::span<const std::string_view> points;
   std::span<const int> point_sizes;  ///< components of each
-  bool depends_on_time;              ///< other than by inputs
+  bool depends_on_time;              ///< functions depend on time other than through inputs
   bool constant_masses;              ///< whether the pivots of the mass matrix are constant
   /// For each argument of the model's functions that may change fast: whether it is the base of a power
   /// (field_look.hpp).
   std::span<const bool> argument_is_base;
-  /// What decides between pieces of functions (PlainFunctions::switches), as text. Of each, two parameters, the last
-  /// ones, are 1 or 0: whether it is > 0, whether it is < 0.
+  /// The switching functions (PlainFunctions::switches), as text. The last parameters are two for each of them, 1 or 0:
+  /// whether it is > 0, whether it is < 0.
   std::span<const std::string_view> switches;
   SeriesInfo series;
   /// What points are drawn as: "bob", "cart" or "pivot"; empty: all are bobs.
   std::span<const std::string_view> point_kinds;
   std::span<const std::string_view> connection_kinds;  ///< "spring" or "thread"
   std::span<const int> connection_ends;                ///< two a connection: 0-based points, -1 is the origin
-  std::span<const SeriesSum> series_sums;              ///< SeriesInfo::sums of them
+  std::span<const SeriesSum> series_sums;              ///< (SeriesInfo::sums)
 
-  /// How many parameters are those of the model itself, without the last ones that tell pieces.
+  /// Number of parameters of the model itself, without the last ones, which tell the sides of switching functions.
   std::size_t own_parameters() const { return parameters.size() - 2 * switches.size(); }
 };
 

@@ -9,7 +9,8 @@
 
 namespace pendula {
 
-/// What programs of kernels do with numbers: calls row(name, function).
+/// Calls row(name, function) for each operation on numbers that a kernel's program may have, in the order of their
+/// codes. operation_names has what follows them.
 template <class Row>
 constexpr void program_operations(Row row) {
   using detail::sum_of_product, std::cbrt;
@@ -21,14 +22,14 @@ constexpr void program_operations(Row row) {
   row("cbrt", [](const auto& x) { return cbrt(x); });
 }
 
-/// What a program says of an operation.
+/// The name of an operation in a program, and its registers.
 struct OperationName {
   std::string_view name;
-  int registers = 0;  ///< results, then operands; 0 for linear systems, which have any number
+  int registers = 0;  ///< number of results and operands; 0 for linear systems, where it varies
 };
 
-/// All operations, by their codes. In the code, an operation is followed by how many registers the consecutive
-/// operations of its kind have together, then for each its result and its operands.
+/// All operations, by their codes. Consecutive operations of one kind are a run: its code, the number of registers of
+/// all of them together, then the result and the operands of each.
 inline constexpr std::array operation_names = [] {
   std::array<OperationName, 24> names;
   auto* next = names.data();

@@ -8,12 +8,12 @@ namespace pendula {
 /// kernel has none.
 struct SeriesInfo {
   bool has_momenta = false;  ///< whether a state is q, p; else q, v
-  int sums = 0;              ///< Σ A_j B_(k−j), of each order
-  int operands = 0;          ///< series that stand in them
-  int kept = 0;              ///< numbers of a state that its first order keeps for the others
+  int sums = 0;              ///< number of sums Σ A_j B_(k−j) in each order k
+  int operands = 0;          ///< number of series A, B in these sums
+  int kept = 0;              ///< numbers that the first order computes once for all orders
 };
 
-/// A sum, by its operands.
+/// The operands A, B of a sum, by their indices.
 struct SeriesSum {
   unsigned short first, second;
 };
@@ -31,7 +31,7 @@ constexpr std::size_t series_lanes(const SeriesInfo& info) {
   return detail::to_multiple_of_8(static_cast<std::size_t>(info.sums));
 }
 
-/// Numbers in a row of SeriesRows::state, for W motions. That of one motion is as long as registers can sum.
+/// Numbers in a row of SeriesRows::state, for W motions. A row of one motion is padded to fill registers.
 constexpr std::size_t series_state_row(std::size_t coordinates, std::size_t W) {
   if (W > 1) return 2 * coordinates * W;
   return coordinates <= 2 ? 4 : detail::to_multiple_of_8(2 * coordinates);

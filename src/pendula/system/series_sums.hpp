@@ -10,9 +10,9 @@
 
 namespace pendula::detail {
 
-/// Sums of one motion, side by side: `operands` has rows of `lanes` first operands and as many second ones. Those of
-/// lanes at … at + 8 groups, from the middle of each sum outward to j = least, so that rows that were just written come
-/// last.
+/// Computes sums of one motion, in lanes `at` to at + 8 groups. `operands` has rows of `lanes` first operands and as
+/// many second ones. Terms are added from the middle of each sum outward to j = least, so that rows that were just
+/// written come last.
 template <std::size_t groups, std::size_t least>
 [[gnu::always_inline]] inline void sums_in_groups(const double* operands, std::size_t lanes, std::size_t at,
                                                   std::size_t k, double* sums) {
@@ -41,7 +41,7 @@ template <std::size_t groups, std::size_t least>
   each([&](auto g) PENDULA_WRITTEN_OUT { (even[g] + odd[g]).store(sums + at + 8 * g); });
 }
 
-/// All of them.
+/// Computes all sums of one motion.
 template <std::size_t least = 1>
 [[gnu::always_inline]] inline void sums_in_lanes(const double* operands, std::size_t lanes, std::size_t k,
                                                  double* sums) {
@@ -71,7 +71,7 @@ void sums_of_many(const double* operands, std::span<const SeriesSum> pairs, std:
   }
 }
 
-/// Sums of eight motions, and how they change where the operands do, which `d_operands` says in rows alike.
+/// The sums of eight motions, and their derivatives where `d_operands` has those of the operands.
 inline void sums_along(const double* operands, const double* d_operands, std::span<const SeriesSum> pairs,
                        std::size_t row, std::size_t k, double* sums, double* d_sums) {
   constexpr std::size_t width = 8;
@@ -94,7 +94,7 @@ inline void sums_along(const double* operands, const double* d_operands, std::sp
   }
 }
 
-/// The sums of W motions where they are known: some together, whose operands are loaded once.
+/// The same with `pairs` known to the compiler: sums that share operands load these once.
 template <int W, const auto& pairs>
 [[gnu::always_inline]] inline void known_sums_of_many(const double* operands, std::size_t row, std::size_t k,
                                                       Pack<W, RegisterFor<W>>* sums) {

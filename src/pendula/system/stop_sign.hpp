@@ -11,7 +11,7 @@ struct StopSign {
   bool operator()() const { return asked != nullptr && asked(about); }
 };
 
-/// A step, or an iteration, of fewer links or coordinates takes less time than to ask for the sign.
+/// With fewer links or coordinates a step, or an iteration, takes less time than to ask for the sign.
 inline constexpr int quick_parts = 1000;
 
 /// A StopSign that asks `stop`, which must outlive it.

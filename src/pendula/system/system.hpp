@@ -70,21 +70,21 @@ inline constexpr bool has_switches = requires {
   S::switch_names;
 };
 
-/// What they are; empty if there are none.
+/// The names of the switching functions; empty if there are none.
 template <class S>
 constexpr std::span<const std::string_view> switch_names() {
   if constexpr (has_switches<S>) return S::switch_names;
   return {};
 }
 
-/// What the points of a kernel are drawn as; empty if it does not say.
+/// What the points of a kernel are drawn as; empty if the kernel does not say.
 template <class S>
 constexpr std::span<const std::string_view> point_kinds() {
   if constexpr (requires { S::point_kinds; }) return S::point_kinds;
   return {};
 }
 
-/// What is drawn between points, and between which; empty if there is nothing.
+/// What is drawn between points; connection_ends() has between which. Both are empty if there is nothing.
 template <class S>
 constexpr std::span<const std::string_view> connection_kinds() {
   if constexpr (requires { S::connection_kinds; }) return S::connection_kinds;
@@ -102,7 +102,7 @@ inline constexpr bool has_series = requires {
   S::series_sums;
 };
 
-/// What it says of them.
+/// The description of the Taylor series of a kernel.
 template <class S>
 constexpr SeriesInfo series_of() {
   if constexpr (has_series<S>) {
@@ -125,7 +125,7 @@ inline constexpr auto sums_of_kernel = [] {
 
 }  // namespace detail
 
-/// Their sums.
+/// The sums of the Taylor series of a kernel.
 template <class S>
 constexpr std::span<const SeriesSum> series_sums_of() {
   if constexpr (has_series<S>) return detail::sums_of_kernel<S>;

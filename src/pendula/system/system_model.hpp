@@ -76,8 +76,8 @@ class SystemModel {
     return std::accumulate(info.parameter_sizes.begin(), info.parameter_sizes.end(), 0);
   }
 
-  // Forces are loads if their power is not zero; this is sampled in a few generic states, near and far, since a force
-  // may act in places alone. Systems that depend on time explicitly always count as loaded.
+  // Forces are loads if their power is not zero. It is sampled in a few generic states, near and far, since a force may
+  // act in some places only. Systems that depend on time explicitly always count as loaded.
   void sample_power() {
     std::vector<double> q(coordinates()), v(coordinates()), driven(inputs());
     const std::vector<double> none(inputs());
@@ -107,7 +107,7 @@ class SystemModel {
   bool loaded_, damped_ = false;
 };
 
-/// W states of a system, each at its own time: their parameters, times and inputs, and calls of its functions.
+/// Calls the functions of a system for W states, each at its own time.
 template <int W>
 class SystemAt {
   static constexpr auto width = static_cast<std::size_t>(W);

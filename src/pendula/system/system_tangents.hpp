@@ -27,8 +27,8 @@ class SystemTangents {
     std::vector<double> place, rate;
   };
 
-  /// A random tangent of length 1, the same for all members, for the member at q and v in a lane. For a member at rest,
-  /// the tangent itself shows its oscillation frequency or damping rate, from which ω follows.
+  /// A tangent of length 1 for the member at q and v in a lane, from the same random numbers for all members. For a
+  /// member at rest ω follows from the accelerations along the tangent: a frequency, or a rate of damping.
   Tangent start(int lane, double time, const double* q, const double* v) {
     std::vector<double> sizes, drawn;
     std::mt19937 random(1);

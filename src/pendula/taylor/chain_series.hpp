@@ -23,8 +23,7 @@ class ChainSeries {
   static constexpr std::size_t D = Rods::D;
   static constexpr int most_order = 24;
 
-  /// Rates up to t^order, rods up to one order more; order ≤ most_order. The unit of time is 1/pace, so that
-  /// coefficients do not depend on the units.
+  /// Series of rates up to t^order, of rods up to one order more; order ≤ most_order. Their unit of time is 1/pace.
   ChainSeries(const Rods& rods, int order)
       : order_(order), links_(rods.links()), sums_(Rods::is_short ? 1 : rods.links()) {}
 
@@ -62,7 +61,7 @@ class ChainSeries {
     return term;
   }
 
-  /// How far it gets in the time t/pace, over t.
+  /// The change in the time t/pace, over t.
   [[gnu::always_inline]] Part rise(int i, const L& t) const {
     const auto last = static_cast<std::size_t>(order_);
     const Link& link = at(i);
@@ -204,7 +203,7 @@ class ChainSeries {
     });
   }
 
-  // Adds the middle term, which has no partner, and the terms with factors of order 0 that are known.
+  // Adds the middle term, which has no partner, and terms whose factor of order 0 has a known partner.
   template <class AllSums>
   [[gnu::always_inline]] void add_unpaired(const Rods& rods, int i, std::size_t k, AllSums& sums) {
     const bool is_even = k % 2 == 0;

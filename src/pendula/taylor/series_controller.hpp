@@ -5,8 +5,8 @@
 
 namespace pendula {
 
-/// Chooses the step of one motion, or of every member, as its Taylor series allows, unless a step failed. The stepper
-/// has longest_step().
+/// Chooses the step of one motion, or of every member: the longest that its Taylor series allows, and after a failed
+/// step a shorter one. The stepper has longest_step().
 template <class L>
 class SeriesController {
  public:

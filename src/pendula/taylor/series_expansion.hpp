@@ -12,8 +12,8 @@
 
 namespace pendula {
 
-/// The Taylor series of one motion about a state, or of several, one in each lane, with what their kernel keeps for
-/// them: coefficients in powers of τ, time over a unit, and the sums of them.
+/// The Taylor series of one motion about a state, or of several, one in each lane: coefficients in powers of τ, time
+/// over a unit of time; the numbers that their kernel keeps; and sums of the series.
 template <class Num>
 class SeriesExpansion {
  public:
@@ -25,14 +25,14 @@ class SeriesExpansion {
         n_(static_cast<std::size_t>(systems.coordinates())),
         row_(series_state_row(n_, W) / W),
         order_(order),
-        // Orders up to one that is a multiple of four, beyond the last one zero: sums are taken four by four.
+        // Room up to a multiple of four orders, zero beyond the last one: sums are taken four by four.
         state_((static_cast<std::size_t>(order) + 5) * row_),
         kept_(static_cast<std::size_t>(info_.kept) + 1),
         operands_(static_cast<std::size_t>(order) * series_operand_row(info_, W) / W + 1),
         inputs_((static_cast<std::size_t>(order) + 1) * systems.info().inputs.size() + 1),
         unit_(1) {}
 
-  /// Coordinates; numbers of a state, with those that fill registers.
+  /// Number of coordinates; numbers in a row of states, with padding.
   std::size_t coordinates() const { return n_; }
   std::size_t row() const { return row_; }
   int order() const { return order_; }
@@ -41,19 +41,19 @@ class SeriesExpansion {
   double* numbers() { return state_[0]; }
   double* inputs() { return inputs_[0]; }
 
-  /// Computes the series about a state up to the orders that give accelerations.
+  /// Computes the first orders of the series about a state, as many as give the accelerations there.
   void begin(MemberSystems<L>& systems, const L& time, const L& unit, const PackRows<W>& state) {
     for (std::size_t k = 0; k < 2 * n_; ++k) to_row(from_row<L>(state[k]), state_[k]);
     to_row(unit, unit_[0]);
     systems.begin_series(time, unit, order_, begun_orders(), inputs_, rows());
   }
-  /// Computes the others.
+  /// Computes the remaining orders.
   void finish(MemberSystems<L>& systems, const L& time) {
     systems.end_series(time, begun_orders() + 1, order_ - 1, inputs_, rows());
   }
 
   L coefficient(std::size_t order, std::size_t k) const { return from_row<L>(state_[order * row_ + k]); }
-  /// Those of a part of a row (for_each_part).
+  /// The coefficients in a part of a row (for_each_part).
   template <class Lanes>
   Lanes coefficients(std::size_t order, std::size_t part) const {
     return from_row<Lanes>(state_[order * row_ + part]);
@@ -64,7 +64,7 @@ class SeriesExpansion {
     return L(static_cast<double>(order + 1)) * coefficient(order + 1, i);
   }
 
-  /// A rate where the series begins, and an acceleration.
+  /// A rate at the state, and an acceleration.
   L velocity(std::size_t i) const { return info_.has_momenta ? coefficient(1, i) / unit() : coefficient(0, n_ + i); }
   L acceleration(std::size_t i) const {
     const L inverse = L(1.0) / unit();
@@ -99,8 +99,8 @@ class SeriesExpansion {
     return sum_of(tau, [&](std::size_t order) { return L(static_cast<double>(order)) * coefficient(order, k); });
   }
 
-  /// Weights w and orders d of Σ w c_(k+d) τ^(k−1), k = 1, 2, …: a polynomial less its constant, over τ; its first and
-  /// second derivatives.
+  /// Weights w and orders d of sums Σ w c_(k+d) τ^(k−1), k = 1, 2, …. Rises: the polynomial less its constant, over τ;
+  /// Slopes and Bends: its first and second derivatives.
   struct Rises {
     static constexpr std::size_t ahead = 0;
     static double weight(std::size_t /*k*/) { return 1; }
@@ -136,8 +136,8 @@ class SeriesExpansion {
     });
   }
 
-  /// Calls visit(first, type) for the parts of a row of states that registers hold: of one motion as many numbers as
-  /// they have, of several each number of all.
+  /// Calls visit(first, type) for the parts of a row of states that fill a register: several numbers of one motion, or
+  /// one number of all members.
   template <class Visit>
   [[gnu::always_inline]] void for_each_part(Visit visit) const {
     if constexpr (is_batch<L>) {

@@ -15,8 +15,8 @@
 
 namespace pendula {
 
-/// Holds the steps of a Taylor series against the equations: its terms know nothing of what is ahead and vanishes with
-/// all its derivatives where the step begins, as a hill of a high power does.
+/// Checks whether steps of a Taylor series solve the equations on the way. Its terms do not show a force that almost
+/// vanishes, with all its derivatives, where the step begins, such as a hill of a high power.
 template <class Num>
 class SeriesLooks {
  public:
@@ -35,7 +35,7 @@ class SeriesLooks {
         found_(series.coordinates()),
         arguments_(3 * systems.info().argument_is_base.size() + 1) {}
 
-  /// A step that is tried: what it goes by, where it begins, and the series that has begun at its end.
+  /// A step that is tried: its series, the time where it begins and its size, and the series that has begun at its end.
   struct Step {
     const Series& series;
     const SeriesReach<L>& reach;
@@ -43,7 +43,7 @@ class SeriesLooks {
     L time, size;  // s
   };
 
-  /// Which of these members solve the equations on the way. `rises_at_end` are Series::rises of all coordinates there.
+  /// Returns which of these members solve the equations on the way. `rises_at_end` are Series::rises at the end.
   Mask hold(const Step& step, const PackRows<width_of<L>>& rises_at_end, const Mask& wanted) {
     const std::size_t n = step.series.coordinates();
     const L tau = step.size / step.series.unit();
@@ -75,13 +75,13 @@ class SeriesLooks {
 
  private:
   static constexpr std::size_t W = width_of<L>;
-  // Places of a step that goes far where accelerations are compared, the end among them, as in every step; and how
-  // closely functions that may be narrow are looked at, in nodes of a Gauss method.
+  // Every step compares accelerations at its end; one that goes far at so many places, the end among them. Functions
+  // that may be narrow are looked at as closely as by a Gauss method of `most_looks` nodes.
   static constexpr int looks = 3, most_looks = 8;
   static constexpr double far_turn = 0.5, far_way = 0.25;  // rad; of the largest length
   static constexpr double largest_ratio = 10;  // of bases of powers in a step, which looks at three places show
 
-  /// In which members the step is so long that it may have gone over something that its end is not beside.
+  /// In which members the step goes so far that forces on the way may not show at its end.
   Mask goes_far(const Step& step) const {
     L turn(0.0), way(0.0), size(0.0);
     for (std::size_t i = 0; i < step.series.coordinates(); ++i) {
@@ -127,8 +127,8 @@ class SeriesLooks {
     systems_.here(time, &SystemFunctions::acceleration, seen_[0], seen_[seen_.rows() / 2], found_[0]);
   }
 
-  /// Whether the series bends by the accelerations that were found, but for what terms beyond its order may add, and
-  /// for the rounding of coordinates: where a motion dies away far from 0, nothing else is left.
+  /// Whether the second derivative of the series is the acceleration in found_, up to the allowed defect and to
+  /// rounding of coordinates: where a motion dies away far from 0, only rounding is left.
   Mask bends_so(const Step& step, const L& tau) {
     const Series& series = step.series;
     const std::size_t n = series.coordinates();
@@ -151,8 +151,8 @@ class SeriesLooks {
     return held;
   }
 
-  /// Arguments of functions that may be narrow, at the motion that was seen: where the step begins (look 0), in its
-  /// middle, and at its end.
+  /// Finds the arguments of functions that may be narrow, at the state in seen_. Looks 0, 1 and 2 are the start, the
+  /// middle and the end of the step.
   void find_arguments(const L& time, int look) {
     systems_.here(time, &SystemFunctions::call_arguments, seen_[0], seen_[seen_.rows() / 2], argument(look, 0));
   }
@@ -191,7 +191,8 @@ class SeriesLooks {
     return change;
   }
 
-  /// Which of these members solve the equations wherever such functions change fast within the step; others do.
+  /// Checks the members in `which` wherever such functions change fast within the step. Returns false for those of them
+  /// that do not solve the equations there, true for all others.
   Mask solves_closely(const Step& step, const Mask& which) {
     const L asked = select(which, L(1.0), L(0.0));
     L wrong(0.0);

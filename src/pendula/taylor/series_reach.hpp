@@ -18,7 +18,7 @@
 
 namespace pendula {
 
-/// How long a step the Taylor series of a kernel allows, by its last terms.
+/// Finds the longest step that the Taylor series of a kernel allows, by its last terms.
 template <class Num>
 class SeriesReach {
  public:
@@ -39,8 +39,8 @@ class SeriesReach {
         scales_(series.row()),
         rate_scales_(series.row()) {}
 
-  /// From the decay of the last terms, relative to the size of the motion; 0 if one is not finite. Several terms are
-  /// used, because motions that start at rest, and symmetric ones, have only every second or fourth term.
+  /// The longest step, from the decay of the last terms, relative to the size of the motion  [s]; 0 if one is not
+  /// finite. Several terms are used: motions that start at rest, and symmetric ones, have only every second or fourth.
   L longest_step(const Series& series) {
     find_scales(series);
     const std::size_t first = static_cast<std::size_t>(series.order()) - looked_at + (series.has_momenta() ? 0 : 1);
@@ -59,14 +59,14 @@ class SeriesReach {
     return exp(L(std::numbers::ln2) * min(log_radius + L(log_reach_), L(600.0))) * series.unit();
   }
 
-  /// What errors of a rate are multiplied by, of the last series, times the unit of time.
+  /// Multiplies an error of rate i, times the unit of time, to make it relative to the motion of the last series.
   L rate_scale(std::size_t i) const { return from_row<L>(rate_scales_[i]); }
 
  private:
   static constexpr int least_order = 6, most_order = 32;
   static constexpr double most_turn = 3;  // rad within a step, so that it is not from hill to hill
 
-  /// The largest terms of some orders from `first` on. Returns of which members all are finite.
+  /// Finds the largest term of each order from `first` on. Returns for which members all are finite.
   Mask find_terms(const Series& series, std::size_t first, std::array<L, looked_at>& terms) const {
     terms.fill(L(0.0));
     L none(0.0);
@@ -92,7 +92,7 @@ class SeriesReach {
     return none == L(0.0);
   }
 
-  /// Calls visit(number) for those of one motion that a register holds, or for that of several members.
+  /// Calls visit(number) for each number of one motion in a register, or once for a register of several members.
   template <class Lanes, class Visit>
   [[gnu::always_inline]] static void for_each_number(const Lanes& lanes, Visit visit) {
     if constexpr (std::is_same_v<Lanes, L>) {
@@ -137,7 +137,7 @@ class SeriesReach {
 
   std::span<const bool> is_angle_;
   double log_reach_;  // step size relative to the estimated radius of convergence, log₂
-  // What terms of coordinates are multiplied by, and of rates, times the unit of time; those of rates as they are.
+  // Factors that make terms relative: of coordinates and of rates times the unit of time; of rates themselves.
   PackRows<width_of<L>> scales_, rate_scales_;
 };
 

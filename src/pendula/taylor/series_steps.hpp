@@ -24,12 +24,12 @@
 
 namespace pendula {
 
-/// What ExplicitSystem asks of a method: forces are looked at during a step as densely as by a quadrature of this
-/// order.
+/// The constants that ExplicitSystem needs of a method. Forces are looked at during a step as densely as by a
+/// quadrature of order error_order.
 struct TaylorSeries {
   static constexpr int error_order = 14;
   static constexpr bool is_blind = false;
-  static constexpr bool looks_itself = true;  // at its own polynomial: SeriesLooks
+  static constexpr bool looks_itself = true;  // SeriesLooks checks the step
 };
 
 /// Steps by the Taylor series of a kernel, of one motion (the stepper of SingleIntegrator) or of several members at
@@ -72,7 +72,7 @@ class SeriesSteps {
 
   SeriesSteps& chain() { return *this; }
   const SeriesSteps& chain() const { return *this; }
-  /// Coordinates of the system.
+  /// Number of coordinates.
   int count() const { return static_cast<int>(n_); }
   const Parts& parts() const { return now_.parts; }
 
@@ -82,8 +82,8 @@ class SeriesSteps {
     Parts parts;                       // q and v
     L unit{1.0};                       // of time, for the series about this state  [s]
   };
-  /// A member comes into a lane, with its numbers, at q and v at `time`. The first one comes into all lanes, so that
-  /// they have numbers to compute with.
+  /// A member starts in a lane, at q and v at `time`. The first one is put into all lanes, so that all of them have
+  /// valid numbers.
   void start(int lane, double time, const PlainSystem& system, const double* q, const double* v) {
     if (!is_seated_) {
       is_seated_ = true;
@@ -156,8 +156,8 @@ class SeriesSteps {
     return longest_;
   }
 
-  /// Tries a step of `h` from `time`. Returns of which `wanted` members its end is finite, and the series solves the
-  /// equations on the way. The state is unchanged.
+  /// Tries a step of `h` from `time`. Returns for which of the `wanted` members its end is finite and the series solves
+  /// the equations on the way. The state is unchanged.
   PENDULA_IN_REGISTERS [[gnu::noinline]] Mask solve(const L& time, const L& h, const Mask& wanted) {
     time_ = time;
     if (!is_expanded_) expand();
@@ -171,7 +171,7 @@ class SeriesSteps {
       to_row(there, trial_.state[k]);
       to_row(change - (there - x), trial_.low[k]);
     });
-    // Near the size that its steps will have; a step that the end of a run has cut short says nothing of that.
+    // The unit is near the size of the next step: longest_, since the end of a run may have cut this step short.
     trial_.unit = select(longest_ <= most_growth * unit, longest_, unit);
     ahead_.begin(systems_, time + h, trial_.unit, trial_.state);
     is_begun_ = false;
@@ -224,7 +224,7 @@ class SeriesSteps {
     is_begun_ = all(which);
   }
 
-  /// From now on steps keep their derivative; nothing where the kernel has none.
+  /// From now on steps keep their derivative. Empty if the kernel has none.
   std::optional<SeriesTangent>& linearize(const SystemModel& model) requires(!is_batch<L>) {
     if (!tangent_ && SeriesTangent::is_had_of(model.table())) tangent_.emplace(model, series_.order()).forget();
     is_expanded_ = false;
@@ -232,8 +232,8 @@ class SeriesSteps {
   }
   std::optional<SeriesTangent>& tangent() requires(!is_batch<L>) { return tangent_; }
 
-  /// The largest z for which a step multiplies what decays as e^(−z) correctly to `error` of z: the series of e^(−z) is
-  /// off by z^(order+1)/(order+1)!.
+  /// The largest z for which a step multiplies a tangent that decays as e^(−z) correctly to `error` in z: the error of
+  /// the series of e^(−z) is z^(order+1)/(order+1)!.
   double resolved_decay(double error) const requires(!is_batch<L>) {
     const double most = std::log(error) + std::lgamma(series_.order() + 2);
     double z = 0;
@@ -260,7 +260,7 @@ class SeriesSteps {
 
   /// Bounds of how far a coordinate and its rate get within the last step from where they begin.
   Part excursion(int i) const requires(!is_batch<L>) {
-    constexpr double beyond = 4;  // last terms: what rates by momenta may differ by from those of the series
+    constexpr double beyond = 4;  // times the last terms: rates from momenta may differ by that from the series
     const auto k = static_cast<std::size_t>(i);
     const auto last = static_cast<std::size_t>(series_.order()) - (has_momenta() ? 1 : 0);
     const L unit = series_.unit(), tau = step_ / unit;
@@ -271,7 +271,7 @@ class SeriesSteps {
     return {{place}, {(turned + beyond * rest) / unit}};
   }
 
-  /// The same where rates are those of the momenta there.
+  /// The same, with rates from the momenta there.
   template <class Visit>
   void for_each_at_full_order(double share, Visit visit) {
     const L tau = L(share) * step_ / series_.unit();
@@ -298,7 +298,8 @@ class SeriesSteps {
     return motion;
   }
 
-  /// The time in which the motion changes by itself, or 1 rad; 1 s where nothing moves. `rates_` has accelerations.
+  /// The time in which a coordinate changes by its own size, or by 1; 1 s where nothing moves. `rates_` has
+  /// accelerations  [s].
   double first_unit(int lane, const double* q, const double* v) const {
     double squared = 0;
     for (std::size_t k = 0; k < n_; ++k) {
@@ -349,7 +350,7 @@ class SeriesSteps {
   SeriesLooks<L> looks_;
   FullState now_, trial_;
   PackRows<W> rises_;         // of the series to the end of the tried step
-  PackRows<W> seen_, rates_;  // a motion, and what a kernel's function says of it
+  PackRows<W> seen_, rates_;  // a state, and the result of a kernel's function there
   L time_{0.0}, begin_time_{0.0};
   L tried_{0.0}, step_{1.0};  // of the tried step, of the last one
   L longest_{0.0}, energy_sum_{0.0};

@@ -21,14 +21,14 @@
 
 namespace pendula {
 
-/// The derivative of a step by the Taylor series of a kernel, exactly that of the discrete step: its coefficients in
-/// dual numbers, of eight directions at once, one in each lane (SystemFunctions::series_next_along).
+/// The derivative of a discrete step by the Taylor series of a kernel. Its coefficients are computed in dual numbers,
+/// for eight directions at once, one in each lane (SystemFunctions::series_next_along).
 ///
-/// Coordinates of the tangent space are (δq, δp), canonical. Parameters are those of the kernel, then its inputs, which
-/// are varied by what is constant through the step; both in the order of their names.
+/// Tangents are (δq, δp), canonical. Parameters are those of the kernel, then its inputs, which vary by a constant
+/// through the step; both in the order of their names.
 class SeriesTangent {
  public:
-  /// Whether a kernel has what it takes.
+  /// Whether a kernel has the functions for this.
   static bool is_had_of(const SystemTable& table) { return table.of_8.series_next_along != nullptr; }
 
   /// `model` has such a kernel; `order` is that of the steps.
@@ -76,8 +76,8 @@ class SeriesTangent {
     }
   }
 
-  /// The log₂ of the unit of time over which the last terms decay to 1: as a motion's step follows from them, so does
-  /// that of tangents, which may move where the motion does not.
+  /// The log₂ of the radius of convergence in units of time, by the last `terms` terms of the derivatives. It limits
+  /// steps like that of the motion, since tangents may change where the motion does not.
   double log_radius(std::size_t terms) const {
     const std::size_t last = order_ - (info().has_momenta ? 1 : 0);
     double log_radius = detail::largest_log_radius;
@@ -89,7 +89,7 @@ class SeriesTangent {
     return log_radius;
   }
 
-  /// A step of h was taken by this series, between these motions.
+  /// Keeps the derivative of a step of h that was taken by this series, from `begin` to `end`.
   void keep(double h, Motion begin, Motion end) {
     h_ = h;
     begin_ = std::move(begin);
@@ -105,7 +105,7 @@ class SeriesTangent {
     from.rates(Directions<>::Identity(size(), size()), rates);
     to.tangents(by_state_ * rates, by_state_);
   }
-  /// No step was taken yet: its derivative is the identity.
+  /// Sets the derivative to the identity: no step was taken yet.
   void forget() {
     by_state_.setIdentity();
     by_parameters_.setZero(size(), parameters());
@@ -134,7 +134,7 @@ class SeriesTangent {
 
   const SeriesInfo& info() const { return model_.info().series; }
 
-  /// Only where somebody asks.
+  /// Derivatives with respect to parameters, computed when first asked for.
   const Directions<>& by_parameters() {
     if (by_parameters_.rows() == size()) return by_parameters_;  // there may be no parameters
     const Directions<> alone = Directions<>::Identity(parameters(), parameters());
@@ -160,7 +160,7 @@ class SeriesTangent {
     return by_parameters_;
   }
 
-  /// What a direction is at the end of the step.
+  /// The value of a direction at the end of the step.
   Eigen::VectorXd end_of(const PackRows<width>& changes, std::size_t lane) const {
     Eigen::VectorXd end(size());
     const double tau = h_ / unit_;
@@ -172,7 +172,7 @@ class SeriesTangent {
     return end;
   }
 
-  /// All rows of the series and of its changes, from the first ones of these.
+  /// Computes all rows of the series and of `changes`, from the first row of `changes`.
   void differentiate(PackRows<width>& changes) {
     const SystemFunctions& functions = model_.table().of_8;
     for (std::size_t row = 0; row < rows_; ++row) std::fill_n(state_[row], width, start_[row]);
@@ -196,8 +196,8 @@ class SeriesTangent {
     }
   }
 
-  /// Of a coefficient of all directions, in which rates, or momenta, count by what they move within a unit of time; not
-  /// finite if one of them is not.
+  /// The largest entry of order k in all directions. Rates, or momenta, are scaled by what they move within a unit of
+  /// time. Not finite if one entry is not.
   double size_of_term(std::size_t k) const {
     const std::size_t n = rows_ / 2;
     const auto entry = [&](std::size_t order, std::size_t row, std::size_t column) {
@@ -221,7 +221,7 @@ class SeriesTangent {
   std::vector<double> start_;
   Motion begin_, end_;
   PackRows<width> inputs_, parameters_, varied_, numbers_, state_;
-  std::vector<PackRows<width>> d_state_;  // by each of the state, eight in the lanes of each
+  std::vector<PackRows<width>> d_state_;  // with respect to each number of the state, eight in the lanes of each
   PackRows<width> d_others_, kept_, d_kept_, operands_, d_operands_, sums_, d_sums_;
   Directions<> by_state_, by_parameters_;  // of the step
 };

@@ -138,7 +138,7 @@ class TaylorSteps : public ExplicitState<Rods> {
     return std::clamp(static_cast<int>(std::lround(order)), least_order, ChainSeries<Rods>::most_order);
   }
 
-  // Computes the series about the current states; the largest steps that they allow.
+  // Computes the series about the current states. Returns the largest steps that they allow.
   //
   // A light rod between heavy ones may soon turn much faster than anything does now, which overflows the coefficients:
   // then a shorter unit of time is used.
@@ -154,11 +154,11 @@ class TaylorSteps : public ExplicitState<Rods> {
     return size_by_terms(now);
   }
 
-  // From the decay of the last terms, relative to the size of the motion. Several terms are used, because motions that
-  // start at rest, and symmetric ones, have only every second or fourth term.
+  // The largest steps, from the decay of the last terms, relative to the size of the motion. Several terms are used:
+  // motions that start at rest, and symmetric ones, have only every second or fourth.
   PENDULA_IN_REGISTERS [[gnu::noinline]] L size_by_terms(const L& now) {
     const L pace = now * now, units = pace_ / now;
-    const L moves = (units * units) * term_squared(1, pace);  // where it is, or will be
+    const L moves = (units * units) * term_squared(1, pace);  // size of the motion
     const L log_size = log2_near(max(min(select(moves > L(0.0), moves, L(1.0)), L(1.0)), L(detail::almost_zero)));
     L log_radius(detail::largest_log_radius);
     for (int k = series_.order() - looked_at + 1; k <= series_.order(); ++k) {
@@ -183,7 +183,7 @@ class TaylorSteps : public ExplicitState<Rods> {
   L pace_{1.0};               // inverse of the unit of time
   L tried_{0.0}, step_{1.0};  // tried steps, last accepted steps
   L tried_from_{0.0};         // times at which these began
-  L longest_{0.0};            // that the series allows
+  L longest_{0.0};            // steps that the series allows
   bool is_expanded_ = false;  // the series is about the current states
   Parts trial_;
   [[no_unique_address]] typename State::LowParts trial_low_;

@@ -25,7 +25,7 @@ function lit(rgb, [light, gloss]) {
 }
 
 /// Pictures of balls as they are seen with some axes of the screen, by colour and size.
-class BallPictures {
+class BobPictures {
   #pictures = new Map();
   #axes = "";
   #last = {}; // most balls are alike

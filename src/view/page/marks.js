@@ -3,7 +3,8 @@
 /// Half of the thumb of the line of time: its middle goes no further to the sides.
 const thumb = 8;
 
-/// The events of one name, of all runs together, as they follow each other: {time, up}.
+/// All events of one name, of all runs: {name, count, isThinned, marks}. `marks` has {name, time, up} of each, in the
+/// order of time.
 function occurrences(name) {
   const all = runs.flatMap((run) => run.events.filter((event) => event.name === name));
   const marks = all.flatMap((event) => event.times.map((time, k) => ({ name, time, up: event.up[k] })));

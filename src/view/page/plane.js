@@ -74,7 +74,7 @@ class Plane {
       if (kind === "pulleys") drawPulleys(pen, ...ends.map(at), this.#cartSize(ends[0]));
       else drawConnection(pen, kind, ...ends.map(at), Math.max(0.04 * stage.reach * stage.pixels, 3));
     }
-    this.#drawBalls(figure, shown);
+    this.#drawBobs(figure, shown);
     if (!faint) stage.kinds.forEach((kind, i) => this.#drawThing(kind, i, at(i), rgba(i === stage.count - 1 ? rgb.tip : rgb.ball)));
   }
 
@@ -87,7 +87,7 @@ class Plane {
   }
 
   // The last one in the colour of its trace; of faint figures only that one. Balls without shades are one path.
-  #drawBalls({ rgb, faint }, shown) {
+  #drawBobs({ rgb, faint }, shown) {
     const { pen, stage } = this;
     const { count, kinds, radii, pixels } = stage;
     const radius = (i) => Math.max(radii[i] * pixels * (faint ? 0.5 : 1), 1.3);

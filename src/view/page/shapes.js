@@ -1,4 +1,5 @@
-// What carts, springs and pivots look like on a canvas: here and in the laboratory.
+// What carts, springs and pivots look like on a canvas: here and in the laboratory. Bobs are drawn in plane.js and
+// space.js.
 
 /// Lengths in the size of a cart, or parts of a spring; films have the same (plotting/pendula_plot/shapes.py).
 const proportions = {

@@ -6,7 +6,7 @@ const across = (a, b) => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], 
 class Space {
   constructor(stage) {
     this.stage = stage;
-    this.pictures = new BallPictures();
+    this.pictures = new BobPictures();
     this.floorSize = 3.2 * stage.radius;
     this.grid = this.#gridLines();
     this.pivotRadius = Math.min(0.014 * stage.reach, 1.4 * Math.max(...stage.radii));
@@ -111,7 +111,7 @@ class Space {
     this.throws = hasShadow && this.shadow !== null;
     const rods = this.#rodsOf(places, radii);
     if (this.throws) this.#drawShadows(places, radii, rods);
-    this.#addBalls(places, radii, rgb);
+    this.#addBobs(places, radii, rgb);
     const parts = clamp(Math.round(24 / stage.count), 1, 6);
     for (const { from, to } of rods) this.#addBar(from, to, parts, this.rodRadius, rgb.rod);
     for (const { kind, ends } of stage.connections) this.#addConnection(kind, ...ends.map(at), rgb.rod);
@@ -167,7 +167,7 @@ class Space {
     pen.fill();
   }
 
-  #addBalls(places, radii, rgb) {
+  #addBobs(places, radii, rgb) {
     const { pen, stage } = this;
     const { axes, pixels, fine, kinds, count } = stage;
     const shown = stage.projected(places);

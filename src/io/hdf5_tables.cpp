@@ -1,4 +1,4 @@
-// Tables that grow: making, compressing, writing and reading them.
+// Makes, compresses, writes and reads tables that grow.
 
 #include <hdf5.h>
 #include <isa-l/igzip_lib.h>
@@ -49,7 +49,7 @@ void shuffle(std::span<const double> numbers, std::vector<unsigned char>& bytes)
   }
 }
 
-/// Compresses as zlib; false if that makes nothing shorter.
+/// Compresses as zlib; false if the result is not shorter.
 bool deflate(std::vector<unsigned char>& bytes, std::vector<unsigned char>& packed) {
   thread_local std::vector<unsigned char> memory(ISAL_DEF_LVL1_DEFAULT);
   packed.resize(bytes.size());
@@ -108,7 +108,7 @@ void set_rows(const Handle& dataset, std::size_t rows) {
   require(H5Dset_extent(dataset.get(), wanted.data()));
 }
 
-// A chunk has a mask of the filters that were not applied; no filter is applied to one that is not packed.
+// A chunk has a mask of the filters that were not applied: of all of them if it is not packed.
 void write_chunk(const Handle& dataset, std::size_t row, std::span<const double> numbers, bool packed) {
   constexpr std::uint32_t no_filter = 0b11, not_deflated = 0b10;
   thread_local std::vector<unsigned char> shuffled, deflated;
