@@ -43,7 +43,7 @@ class Pace {
   /// κ  [1/s²].
   const Num& slowest_squared() const { return slowest_squared_; }
 
-  /// Σ M_kk v_k² of the rates that forces at the start give in the time 1/√κ. Rates are small compared to these.
+  /// Σ M_kk v_k² of the rates that forces at the start give in the time 1/√κ: the scale by which rates are small.
   const Num& natural_speed_squared() const { return natural_speed_squared_; }
 
   /// R², from Σ v_k⁸ over the angles.
