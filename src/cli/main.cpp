@@ -25,7 +25,7 @@
 namespace pendula::cli {
 namespace {
 
-/// What is wrong with a command line, and where to read more.
+/// The message for a wrong command line, with a hint at where to read more.
 std::string complaint(const CommandLine& line, const std::string& what) {
   const std::vector<CLI::App*> chosen = line.app.get_subcommands();
   const CLI::App& app = chosen.empty() ? line.app : *chosen.front();

@@ -58,7 +58,7 @@ class StepHistory {
   std::vector<double> times_, numbers_;  // q and v of each
 };
 
-/// How an advance ended.
+/// The result of an advance.
 struct Advance {
   Outcome outcome;  ///< of the last step
   bool stopped = false;

@@ -35,11 +35,11 @@ class Expression {
   /// Whether it may jump where its columns change smoothly: by a comparison, ?:, sign, rint or floor.
   bool may_jump() const;
 
-  /// Its value for the numbers of `columns`; NaN where it has none.
+  /// The value for the numbers of `columns`; NaN where there is none.
   double operator()(std::span<const double> numbers);
-  /// Bounds of its value over a time, from bounds of the numbers.
+  /// Bounds of the value over an interval of time, from bounds of the numbers.
   Reach operator()(std::span<const Reach> numbers);
-  /// Its value, and its derivative along that of the numbers.
+  /// The value, and its derivative along that of the numbers.
   Dual<double> operator()(std::span<const Dual<double>> numbers);
 
  private:

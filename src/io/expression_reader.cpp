@@ -69,7 +69,7 @@ class ExpressionReader {
   }
 
  private:
-  /// What is known of a node.
+  /// Properties of a node.
   struct Kind {
     bool is_constant = false, is_plain = false;
     bool has_time = false, has_others = false;

@@ -83,7 +83,7 @@ Handle create_file(const std::string& file) {
 Handle open_file(const std::string& file) {
   errno = 0;
   // HDF5 reads a part again if its checksum does not match, after a pause that doubles each time: 2¹⁶ ns in all here.
-  // Its default would take longer than a lifetime.
+  // The default would take longer than a lifetime.
   constexpr unsigned attempts = 16;
   const Handle access = file_access();
   require(H5Pset_metadata_read_attempts(access.get(), attempts));

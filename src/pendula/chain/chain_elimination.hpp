@@ -7,12 +7,11 @@
 
 namespace pendula {
 
-/// What Newton and the tangent of a step have in common: the blocks that one link has in the linearised stage
-/// equations.
+/// The common base of Newton and of the tangent of a step: the blocks of one link in the linearised stage equations.
 ///
-/// Unknown are the stage velocities V of the rods, at every stage across its rod X. With H_kj = h a_kj, X̂ = X/|X|² and
-/// u = V − z, momenta enter as what they gain in the step, G_i = Σ_{j≥i} m_j Σ_{k≤j} u_k, and stage k of link i asks
-/// for
+/// Unknowns are the stage velocities V of the rods, at every stage across its rod X. With H_kj = h a_kj, X̂ = X/|X|² and
+/// u = V − z, momenta enter by their change in the step, G_i = Σ_{j≥i} m_j Σ_{k≤j} u_k, and the equation of stage k of
+/// link i is
 ///   q(k) = Σ_j H_kj f(j) + τ(k) X(k) − G(k) = 0,  f = −τ V − (λ/l²) V + (torque × X)/l² − M g up.
 /// Stacked over the stages, t_b(k) the d − 1 tangents of X(k):
 ///   E[k,j] = δ + H_kj V(k)·X̂(j),  E₂[k,j] = δ − H_kj X̂(k)·V(j)           (s x s, the identity at h = 0)

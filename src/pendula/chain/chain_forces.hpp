@@ -17,9 +17,10 @@ namespace pendula {
 ///
 /// Damping and torque join τ_i ξ̇_i of the field (ChainMotion) as (λ_i ξ̇_i − torque_i × ξ_i)/l_i².
 ///
-/// In a long step the stage equations of hanging rods have a fold, with two stages at h ω = √12, if the chain swings
-/// with ω. So in a step that does not resolve ω, M |g|/l ξ joins τ ξ̇: it comes from a term Σ M |g|/l (|ξ|² − l²)/2 of
-/// H, which is zero on the motion. The τ of a chain at rest is then zero, and steps may be as long as in angles.
+/// Multipliers grow through a step as tensions do. Where they grow too far the stage equations have a fold: with two
+/// stages at h ω = √12, if the chain swings with ω. So in a step that does not resolve ω, M |g|/l ξ joins τ ξ̇, from a
+/// term Σ M |g|/l (|ξ|² − l²)/2 of H, which is zero on the motion. For a chain at rest τ is then zero, and steps may be
+/// as long as in angles.
 template <class SpaceType, class LayoutType, int N>
 class ChainForces {
  public:

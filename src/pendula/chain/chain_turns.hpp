@@ -138,7 +138,7 @@ class ChainTurns : public ChainMotion<Space, StagesInLanes<S, Real>, N> {
     bounds.angles = {far < 1 ? Real(asin(far)) : infinite, infinite};
     bounds.rates.fill(infinite);
     if (!(nearest > Real(0.1) * level)) return bounds;
-    // theta_dot is the vertical rate over the level, phi_dot the horizontal one across the axis over the level.
+    // For a direction (x, y, z), theta_dot = ż/level and phi_dot = (x ẏ − y ẋ)/level².
     bounds.angles[1] = asin(far / level);
     bounds.rates = {change / nearest + fastest * (1 / nearest - 1 / level),
                     (level * change + far * fastest) / (nearest * nearest) +

@@ -10,7 +10,7 @@
 
 namespace pendula {
 
-/// What runs must have in common to go in lanes together.
+/// The properties that runs must share to go in lanes together.
 struct LaneKind {
   int dimension = 0, links = 0;         // of chains
   const SystemTable* kernel = nullptr;  // of other systems, and of chains that move by its series

@@ -22,7 +22,7 @@
 
 namespace pendula {
 
-/// How members are moved.
+/// Options of a MemberQueue.
 struct QueueOptions {
   double step = 0;                ///< s; 0: adaptive steps of each member, by the tolerance
   double tolerance = 1e-9;        ///< of the motion, relative to its size, as RunOptions::tolerance

@@ -7,7 +7,7 @@
 
 namespace pendula {
 
-/// How small the corrections of a fixed point become, relative to what a step moves.
+/// Sizes of the corrections of a fixed point, relative to the size of the step.
 struct CorrectionLimits {
   double enough = 1e-18;  ///< of the first correction that is left out: far below a last bit
   double last_bit = std::numeric_limits<double>::epsilon();
@@ -83,7 +83,7 @@ class FixedPointStop {
   int count() const { return count_; }
   const Num& first() const { return first_; }  ///< correction
 
-  /// What is remembered from step to step.
+  /// Visits the numbers that are remembered from step to step.
   template <class Numbers>
   void member(Numbers& numbers) {
     numbers(rate_);

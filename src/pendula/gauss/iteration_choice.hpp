@@ -113,7 +113,7 @@ class IterationChoice {
   bool gave_up_ = false;
   bool newton_is_allowed_ = true;
   std::int64_t steps_ = 0;
-  int wait_ = 0, next_wait_ = 1;  // steps until a fixed point that has given up is tried; 0: it has not given up
+  int wait_ = 0, next_wait_ = 1;  // steps until a fixed point that has given up is tried; 0: trials as usual
 };
 
 }  // namespace pendula

@@ -7,7 +7,7 @@
 
 namespace pendula {
 
-/// How stage values are laid out where several members are solved at once: a pack for each stage, with a member in each
+/// The layout of stage values where several members are solved at once: a pack for each stage, with a member in each
 /// lane. StagesInLanes is the layout of one motion.
 template <int S, class Number>
 struct MembersInLanes {

@@ -39,7 +39,7 @@ class NewtonStop {
     return stalled;
   }
 
-  /// What is remembered from step to step.
+  /// Visits the numbers that are remembered from step to step.
   template <class Numbers>
   void member(Numbers& numbers) {
     numbers(constant_, steps_);

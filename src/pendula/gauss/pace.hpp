@@ -43,7 +43,7 @@ class Pace {
   /// κ  [1/s²].
   const Num& slowest_squared() const { return slowest_squared_; }
 
-  /// Σ M_kk v_k² of the rates that forces at the start give in the time 1/√κ. Rates are small compared to these.
+  /// Σ M_kk v_k² of the rates that forces at the start give in the time 1/√κ: the scale by which rates are small.
   const Num& natural_speed_squared() const { return natural_speed_squared_; }
 
   /// R², from Σ v_k⁸ over the angles.
@@ -131,8 +131,8 @@ class Pace {
   };
 
   /// κ of a motion that starts with `first`. Where forces hardly change with the coordinates, as at the inflection of a
-  /// potential, κ where the motion comes to in a time t counts, too, but as 1/t² at most. Forces are taken as constant
-  /// until then.
+  /// potential, κ at the state after a time t counts, too, but as 1/t² at most. That state is found with constant
+  /// forces.
   static double stiffness(const SystemAt<1>& here, const double* q, const double* v, const Forces& first,
                           std::span<const bool> is_angle) {
     constexpr double longest = 0x1p20, shortest = 0x1p-30;  // s

@@ -88,7 +88,7 @@ class StageColumns {
     for (std::size_t j = 0; j < stages_; ++j) sum += h_ == 0 ? Real(0) : Real(start_[j] * x[j] / hb_[j]);
     return sum;
   }
-  /// How much larger the error of the stage polynomial is at the last stage of the next step than at its own start.
+  /// The error of the stage polynomial at the last stage of the next step, relative to that at the start of its own.
   Real predictor_gain() const {
     Real gain(1);
     for (std::size_t j = 0; j < stages_; ++j) gain *= (1 + c_[stages_ - 1] - c_[j]) / c_[j];

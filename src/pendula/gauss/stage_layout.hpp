@@ -12,8 +12,8 @@
 
 namespace pendula {
 
-/// How stage values are laid out where one motion is solved: all stages of a number in one pack. MembersInLanes is the
-/// layout of several members. A Row is one number at all stages; it is made of cells, which are worked on one by one.
+/// The layout of stage values where one motion is solved: all stages of a number in one pack. MembersInLanes is the
+/// layout of several members. A Row is one number at all stages; it is made of cells, which loops take one by one.
 /// Where S is Eigen::Dynamic, the number of stages is given at run time, at most Width; the rest of a row is zero.
 template <int S, class Real, int Width = lanes_for<Real>(S)>
 struct StagesInLanes {

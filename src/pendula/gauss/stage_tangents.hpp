@@ -145,7 +145,7 @@ class StageTangents {
   static constexpr std::size_t pasts = static_cast<std::size_t>(Columns::most_depth);
   static constexpr std::size_t kinds = 4;  // δq, δq̇, q̈, δq̈
 
-  // What steps are predicted from: h δq̇ and h δq̈.
+  // Stage values for predictions of later steps: h δq̇ and h δq̈.
   struct Past {
     Stages moved{}, sped{};
   };

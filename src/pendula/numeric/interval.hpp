@@ -128,14 +128,14 @@ inline Interval tanh(const Interval& x) {
 inline Interval exp(const Interval& x) {
   return detail::increasing(x, [](double at) { return std::exp(at); });
 }
-/// Of the non-negative part of x, which must not be empty.
+/// The root of the non-negative part of x, which must not be empty.
 inline Interval sqrt(const Interval& x) {
   return detail::increasing({std::max(x.low, 0.0), x.high}, [](double at) { return std::sqrt(at); });
 }
 inline Interval log(const Interval& x) {
   return detail::increasing({std::max(x.low, 0.0), x.high}, [](double at) { return std::log(at); });
 }
-/// Of the part of x in [−1, 1], which must not be empty.
+/// The arcsine of the part of x in [−1, 1], which must not be empty.
 inline Interval asin(const Interval& x) {
   return detail::increasing(common(x, {-1, 1}), [](double at) { return std::asin(at); });
 }

@@ -184,7 +184,7 @@ inline Reach fmod(const Reach& x, const Reach& divisor) {
 inline Reach atan2(const Reach& y, const Reach& x) {
   const bool is_cut = y.value.holds(0) && x.value.low <= 0;
   if (is_cut) return Reach({-std::numbers::pi, std::numbers::pi}, Interval::all()).where(y, x);
-  // It is monotone in x and in y: its extremes are at corners.
+  // atan2 is monotone in x and in y: its extremes are at corners.
   const auto [low, high] = std::minmax({std::atan2(y.value.low, x.value.low), std::atan2(y.value.low, x.value.high),
                                         std::atan2(y.value.high, x.value.low), std::atan2(y.value.high, x.value.high)});
   const Interval slope = (x.value * y.slope - y.value * x.slope) / (pow(x.value, 2) + pow(y.value, 2));

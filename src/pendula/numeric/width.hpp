@@ -5,7 +5,7 @@
 
 namespace pendula {
 
-/// How many members a number holds: the lanes of a pack, 1 for a plain number.
+/// Number of members that a number holds: the lanes of a pack, 1 for a plain number.
 template <class Num>
 inline constexpr std::size_t width_of = Num::width;
 template <std::floating_point Real>

@@ -20,8 +20,8 @@ struct Varied {
   bool is_input;
 };
 
-/// What a motion is differentiated by besides its start: the parameters, then the inputs. These are the rows of a
-/// variation. An input is varied by a constant.
+/// The parameters, then the inputs, with respect to which a motion is differentiated: the rows of a variation. An input
+/// is varied by a constant.
 std::vector<Varied> varied_by(const Subject& subject);
 
 /// A motion to differentiate. Derivatives are those of its discrete steps; step sizes are held fixed.

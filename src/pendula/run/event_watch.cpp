@@ -36,7 +36,7 @@ class StepStates {
     return views_.range_known == StepViews::Known::yes ? &views_.range : nullptr;
   }
 
-  /// By dense output.
+  /// The state by dense output.
   const Motion& at(double u) {
     for (StepViews::View& view : views_.kept) {
       if (view.share == u) return view.motion;
@@ -47,7 +47,7 @@ class StepStates {
     return new_state(u, views_.passing);
   }
 
-  /// At full order; by dense output if the step fails.
+  /// The state at full order; by dense output if the step fails.
   const Motion& at_full_order(double u) {
     if (u <= 0) return begin_;
     if (u >= 1) return end_;

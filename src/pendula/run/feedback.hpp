@@ -11,7 +11,7 @@
 
 namespace pendula {
 
-/// What a controller adds to an input: a function of the motion, computed at multiples of the sample time and held in
+/// A controller's addition to an input: a function of the motion, computed at multiples of the sample time and held in
 /// between (a zero-order hold).
 struct SampledLaw {
   std::size_t input = 0;  ///< index among the subject's inputs (inputs.hpp)

@@ -31,8 +31,8 @@ struct InputLine {
 std::shared_ptr<const Subject> with_inputs(const std::shared_ptr<const Subject>& subject,
                                            std::span<const double> inputs, std::span<const InputLine> lines = {});
 
-/// What a table of numbers over time adds to an input: linear from knot to knot, or held from each knot to the next. It
-/// is constant before the first knot, and from the last one on.
+/// A table of numbers over time that is added to an input: linear from knot to knot, or held from each knot to the
+/// next, and constant before the first knot and from the last one on.
 struct Signal {
   std::size_t input = 0;      ///< index among the subject's inputs (inputs.hpp)
   std::vector<double> times;  ///< of the knots, ascending, one at least  [s]

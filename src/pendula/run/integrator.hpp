@@ -26,7 +26,7 @@
 
 namespace pendula {
 
-/// What actually runs, where the options left it open.
+/// The choices that were made where the options left them open.
 struct Description {
   std::string solver;     ///< "dense" or "chain"; empty for explicit methods
   std::string iteration;  ///< "newton" or "fixed-point"; empty for explicit methods

@@ -59,7 +59,7 @@ inline double compared_with(std::optional<double> scale, double initial) {
 
 }  // namespace detail
 
-/// How far the energy was from the initial one plus the work of loads, over the rows; relative to all energy involved.
+/// Extremes, over the rows, of the energy less the initial one and the work of loads, relative to all energy involved.
 struct EnergyBalance {
   double most = 0, least = 0;  ///< relative, above and below
 };
@@ -77,7 +77,7 @@ struct TableRow {
   }
 };
 
-/// What is kept of the rows of a run besides the file: energy errors, a thinned table, the last state.
+/// The record of the rows of a run, besides the file: energy errors, a thinned table, the last state.
 ///
 /// Errors are kept in joules, since their scale may be known only when the run ends.
 class RunRecord {
@@ -125,7 +125,7 @@ class RunRecord {
     return table;
   }
 
-  /// What is kept of the rows so far. The table is thinned again when read, since this run may be longer than the one
+  /// Visits the numbers of the record. The table is thinned again when read, since this run may be longer than the one
   /// that it was saved in.
   template <class Numbers>
   void member(Numbers& numbers) {

@@ -80,7 +80,7 @@ inline SystemNumbers SwitchingSystem::numbers(const Sides& sides) const {
   return numbers;
 }
 
-/// What a function of the kernel writes at a motion, `count` numbers.
+/// The `count` numbers that a function of the kernel writes at a motion.
 template <class Function>
 std::vector<double> SwitchingSystem::at(Function function, std::size_t count, const Sides& sides,
                                         const Motion& motion) const {

@@ -255,7 +255,7 @@ inline Motion size_of(const Track& track) {
 /// Distances of two runs of one system along their motion.
 class Separation {
  public:
-  /// Of two tracks, at their common times.
+  /// The distances of two tracks, at their common times.
   Separation(const Subject& subject, const Track& a, const Track& b) {
     Motion size = size_of(a);
     const Motion other_size = size_of(b);

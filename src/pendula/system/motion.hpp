@@ -10,7 +10,8 @@ struct Motion {
   double time = 0;    ///< s
   Eigen::VectorXd q;  ///< coordinates
   Eigen::VectorXd v;  ///< their rates
-  /// What sampled feedback holds of inputs at this time (run/feedback.hpp); empty where there is none, or at a start.
+  /// The values that sampled feedback holds at this time (run/feedback.hpp); empty without such feedback, and at a
+  /// start.
   Eigen::VectorXd held;
 
   Motion() = default;

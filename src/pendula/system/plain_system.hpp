@@ -58,10 +58,10 @@ struct SystemInfo {
   /// whether it is > 0, whether it is < 0.
   std::span<const std::string_view> switches;
   SeriesInfo series;
-  /// What points are drawn as: "bob", "cart" or "pivot"; empty: all are bobs.
+  /// What points are drawn as: "bob", "cart", "pivot", "weight" or "floor"; empty: all are bobs.
   std::span<const std::string_view> point_kinds;
-  std::span<const std::string_view> connection_kinds;  ///< "spring" or "thread"
-  std::span<const int> connection_ends;                ///< two a connection: 0-based points, -1 is the origin
+  std::span<const std::string_view> connection_kinds;  ///< "spring", "thread" or "pulleys"
+  std::span<const int> connection_ends;                ///< two for each connection: 0-based points, -1 is the origin
   std::span<const SeriesSum> series_sums;              ///< (SeriesInfo::sums)
 
   /// Number of parameters of the model itself, without the last ones, which tell the sides of switching functions.

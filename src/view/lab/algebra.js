@@ -1,6 +1,6 @@
-// Small sums and systems that the engine solves.
+// Small sums and linear systems for the engine.
 
-/// The unit vector along which all ways lie, null where they do not.
+/// The unit vector to which all ways are parallel; null if there is none.
 function directionOf(ways) {
   const length = Math.hypot(...ways[0]);
   if (!(length > 0)) return null;
@@ -28,7 +28,7 @@ function putTorque(torques, space, link, rod, force) {
   }
 }
 
-/// The least change of coordinates that moves a point by `off`, where slopes[k] is how it moves with coordinate k:
+/// The least change of coordinates that moves a point by `off`, where slopes[k] is its derivative by coordinate k:
 /// x = Jᵀ (J Jᵀ + ε)⁻¹ off.
 function leastChange(slopes, off) {
   const n = off.length;

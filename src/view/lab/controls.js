@@ -1,7 +1,7 @@
 // Sliders and buttons.
 
-/// A slider with a number beside it: {key, unit, low, high, step, get, set, level, logarithmic}. `names`: of its text;
-/// `label`: what gives its text, in place of a key.
+/// A slider with a number beside it: {key, unit, low, high, step, get, set, level, logarithmic}. `names` are put into its
+/// text; `label` returns its text, in place of a key.
 class Slider {
   constructor({ key, names = {}, unit, low, high, step, get, set, level = "", logarithmic = false, label }) {
     Object.assign(this, { get, set, logarithmic, low, high, step });
@@ -15,9 +15,9 @@ class Slider {
     this.number.addEventListener("change", () => {
       const typed = Number(this.number.value.replace("−", "-"));
       if (this.number.value !== "" && Number.isFinite(typed) && (!this.logarithmic || typed > 0)) this.#change(typed);
-      this.#write(this.get()); // what was taken of it
+      this.#write(this.get()); // the value that was accepted
     });
-    // The arrows of a slider without steps would be too fine, or too coarse.
+    // Without this, arrow keys on a slider without steps would be too fine or too coarse.
     this.range.addEventListener("keydown", (event) => {
       const way = { ArrowRight: 1, ArrowUp: 1, ArrowLeft: -1, ArrowDown: -1, PageUp: 10, PageDown: -10 }[event.key];
       if (!way) return;
@@ -70,7 +70,7 @@ function torquesOf({ n, space }) {
   return Array.from({ length: n }, (_, k) => axes.map((axis) => ({ name: `torque_${axis}${k + 1}`, unit: "N m" }))).flat();
 }
 
-/// All settings, for as many links as there are now.
+/// All settings, for the present number of links.
 class Controls {
   constructor(lab) {
     this.lab = lab;
@@ -81,7 +81,7 @@ class Controls {
     return this.lab.state;
   }
 
-  /// Makes them again, for another number of links.
+  /// Makes the settings again, for another number of links.
   make() {
     this.sliders = [];
     this.host.replaceChildren();
@@ -115,7 +115,7 @@ class Controls {
     this.host.append(slider.node);
   }
 
-  // What moves; another one begins the page again.
+  // The menu of systems; another one reloads the page.
   #makeMenu() {
     if (Object.keys(models).length === 0) return;
     const menu = element("select", { id: "model" });
@@ -192,8 +192,8 @@ class Controls {
     });
   }
 
-  // Sines on inputs, and what is held: of each input of a model; of a chain of the torque on its first rod, and on those that
-  // the link tells of.
+  // Constant parts of inputs and sines on them: for each input of a model; for a chain the torque on its first rod, and those
+  // in the link.
   #makeDrives() {
     const { lab } = this;
     const state = this.#state;
@@ -226,7 +226,7 @@ class Controls {
     }
   }
 
-  // Where it begins. Of long chains all angles together.
+  // The start; one slider for all angles of a long chain.
   #makeStart() {
     const { lab } = this;
     const { n, space } = this.#state;

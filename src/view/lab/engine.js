@@ -1,13 +1,13 @@
-// The motion, computed by the module: what moves, rows of its motion, and copies that start beside it. Runs in a worker, and
+// The motion, computed by the module: a system, rows of its motion, and copies that start beside it. Runs in a worker, and
 // in the tests.
 
-/// Rows of a motion stand so far apart [s]; steps are of the module's own choice, and end where rows are.
+/// Time between rows of a motion [s]; steps are adaptive, and end at rows.
 const rowInterval = 1 / 120;
 
 /// The tolerance of all steps: energies stay at rounding (docs/reference/laboratory.md).
 const tolerance = 1e-10;
 
-/// Starts the module, a WebAssembly.Module. It asks for nothing but the time.
+/// Starts the module, a WebAssembly.Module. It imports nothing but the clock.
 async function startModule(module) {
   let memory = null;
   const nothing = () => 0;
@@ -40,7 +40,7 @@ class Engine {
     this.forces = null;
   }
 
-  // Numbers may have moved whenever memory grew.
+  // Numbers move when memory grows.
   get #numbers() {
     if (this.#at?.buffer !== this.module.memory.buffer) this.#at = new Float64Array(this.module.memory.buffer);
     return this.#at;
@@ -73,7 +73,7 @@ class Engine {
     return place;
   }
 
-  /// Throws what the module says of its last failure.
+  /// Throws an Error with the module's message of its last failure.
   #fail() {
     throw new Error(this.#text(this.module.pendula_error()));
   }
@@ -93,9 +93,9 @@ class Engine {
     this.copies = [];
   }
 
-  /// What moves: {space, masses, lengths, gravity, damping} of a chain, or {program, parameters}; of both `inputs` that are
-  /// held, of a chain its torques, and `sines` on them: [input, amplitude, frequency, phase] each. `start`: {time, q, v}.
-  /// `step`: constant steps of 4 stages, in place of the tolerance. Throws where it makes no sense.
+  /// Begins a motion. `spec`: {space, masses, lengths, gravity, damping} of a chain, or {program, parameters}; both with
+  /// `inputs`, constant parts (torques of a chain), and `sines` on them: [input, amplitude, frequency, phase] each. `start`:
+  /// {time, q, v}. `step`: constant steps of 4 stages, in place of the tolerance. Throws if that makes no sense.
   begin(spec, start, step = 0) {
     this.free();
     const { module } = this;
@@ -136,7 +136,7 @@ class Engine {
     this.#numbers.set(q, this.q / 8);
     this.#numbers.set(v, this.v / 8);
   }
-  // Its inputs are held.
+  // A simulation from a time, with its inputs held.
   #simulation(time) {
     const simulation = this.#require(this.module.lab_simulation(this.model, time, this.q, this.v, this.step, tolerance, this.step ? 4 : 8));
     if (this.spec.inputs?.some((each) => each !== 0)) {
@@ -156,7 +156,7 @@ class Engine {
     return { time: this.time, q: this.#read(this.q, this.size), v: this.#read(this.v, this.size) };
   }
 
-  /// Numbers of a row: t, q, v, kinetic and potential energy, and of programs the components of points and of their velocities.
+  /// Size of a row: t, q, v, kinetic and potential energy, and for programs components of points and of their velocities.
   get rowSize() {
     return 3 + 2 * this.size + 2 * this.pointCount;
   }
@@ -189,7 +189,7 @@ class Engine {
     return after.map((x, k) => (x - before[k]) / (2 * by));
   }
 
-  /// Points of any coordinates, of a program.
+  /// Points at any coordinates, of a program.
   pointsAt(q, time = this.time) {
     const v = new Float64Array(this.size);
     this.#write({ q, v });
@@ -197,7 +197,7 @@ class Engine {
     return this.#read(this.row + 8 * (this.columns - 1 - this.pointCount), this.pointCount);
   }
 
-  /// Coordinates near to q at which components of a point, from `first` on, are as near as can be to a place: damped least
+  /// Coordinates near to q at which the components of a point, from `first` on, are nearest to a place, by damped least
   /// squares.
   pose(q, first, place, time) {
     const wanted = Array.from(place);
@@ -213,14 +213,14 @@ class Engine {
     return now;
   }
 
-  /// Rates at which the point is as near as can be to a velocity.
+  /// Rates at which the velocity of the point is nearest to a given one.
   ratesFor(q, first, velocity, time) {
     const driven = this.pointRates({ time, q, v: new Float64Array(q.length) });
     const off = Array.from(velocity, (x, k) => x - driven[first + k]);
     return Float64Array.from(leastChange(this.#slopes(q, first, off.length, time), off));
   }
 
-  // How components of a point move with each coordinate, by differences.
+  // Derivatives of the components of a point by each coordinate, by differences.
   #slopes(q, first, count, time) {
     const here = this.pointsAt(q, time);
     return Array.from(q, (x, k) => {
@@ -232,7 +232,7 @@ class Engine {
     });
   }
 
-  /// Goes to the next row. `hand`: what pulls at a chain, {bob, place, speed}, or null.
+  /// Advances to the next row. `hand`: a pull at a chain, {bob, place, speed}, or null.
   next(hand) {
     const target = Math.round((this.time + rowInterval) / rowInterval) * rowInterval;
     if (hand || this.isHeld) {
@@ -254,7 +254,7 @@ class Engine {
     this.#require(this.module.pendula_advance_to(simulation, time) === 0);
   }
 
-  /// A damped spring between a bob and the hand, as torques on the links that carry it, held for half a row.
+  /// A damped spring between a bob and the hand, as torques on the links from the pivot to the bob, held for half a row.
   #hold(hand) {
     const { space, lengths, masses, gravity } = this.spec;
     const own = this.spec.inputs ?? [];
@@ -278,10 +278,9 @@ class Engine {
     this.#require(this.module.pendula_hold(this.simulation, this.held, this.inputs) === 0);
   }
 
-  /// What the points of a program tell at several coordinates about q. `hangs`: on what each hangs by something rigid: the
-  /// point before, the first on the origin (-1) if it moves, or nothing (-2). `rails`: the direction in which each moves, if it is
-  /// always the same, else null. `arms`: which rods and `connections`, [from, to], turn from the vertical. `components`: of each
-  /// point.
+  /// The shape of a program's points, found from several coordinates about q. `hangs`: what each point hangs on rigidly: the
+  /// point before, for the first the origin (-1) if it moves, or nothing (-2). `rails`: the constant direction in which each
+  /// moves, else null. `arms`: rods and `connections`, [from, to], that turn. `components`: number for each point.
   shape(q, components, connections) {
     const firsts = components.map((_, k) => components.slice(0, k).reduce((sum, count) => sum + count, 0));
     const draws = [0, 0.37, -0.81, 1.3].map((by) => this.pointsAt(q.map((x, k) => x + by * (1 + 0.4 * k))));
@@ -316,7 +315,7 @@ class Engine {
     };
   }
 
-  /// Goes to a time at once.
+  /// Advances to a time without rows in between.
   go(time) {
     this.#advance(this.simulation, time);
     this.time = time;
@@ -326,7 +325,7 @@ class Engine {
     return this.module.pendula_steps(this.simulation);
   }
 
-  /// So many copies, each a little further from the motion in every coordinate: of some the motion does not depend.
+  /// Makes copies, each a little further from the motion in every coordinate, since a motion may not depend on some.
   copy(count, apart) {
     for (const copy of this.copies) this.module.pendula_simulation_free(copy);
     const { q, v } = this.motion();
@@ -342,14 +341,14 @@ class Engine {
     this.copies.forEach((copy, k) => all.set(this.motion(copy).q, k * this.size));
     return all;
   }
-  /// Their points, of a program.
+  /// Points of the copies, of a program.
   copyPoints() {
     const all = new Float64Array(this.copies.length * this.pointCount);
     if (this.pointCount) this.copies.forEach((copy, k) => all.set(this.pointsAt(this.motion(copy).q), k * this.pointCount));
     return all;
   }
 
-  /// Begins to measure the leading exponent: by a copy beside the motion that is brought back every half second.
+  /// Begins or ends to measure the leading Lyapunov exponent, by a copy that is brought back to the motion every half second.
   measure(on) {
     if (this.shadow) this.module.pendula_simulation_free(this.shadow);
     this.shadow = null;

@@ -1,7 +1,7 @@
-// The hand: it takes a bob, and the rest follows.
+// The hand, which takes a bob.
 
-/// Angles of a chain whose bob is brought as near as can be to a place; the rods below keep their directions. Rods above
-/// are laid from both ends in turn (FABRIK: Aristidou and Lasenby).
+/// Angles of a chain with a bob as near as possible to a place. The rods below keep their directions; those above are
+/// placed from both ends in turn (FABRIK: Aristidou and Lasenby).
 function posedChain(state, q, bob, place) {
   const { n, space, l } = state;
   const points = [[0, 0, 0]];
@@ -37,7 +37,7 @@ function posedChain(state, q, bob, place) {
 }
 
 class Hand {
-  isPosed = false; // what is shown is where the hand put it, not a motion yet
+  isPosed = false; // the shown state was set by the hand, and is not part of a motion yet
   posing = null;
 
   constructor(lab) {
@@ -49,12 +49,12 @@ class Hand {
     return this.bob >= 0;
   }
 
-  /// Whether a point of a model is held that will have the speed of the hand: time waits meanwhile.
+  /// Whether a held point of a model will be thrown, with the speed of the hand. Time waits meanwhile.
   get throws() {
     return Boolean(model) && this.isHolding && this.wasPlaying;
   }
 
-  /// Where it is to be seen.
+  /// The place where the hand is shown.
   get seen() {
     return { bob: this.bob, place: this.lab.playing || this.throws ? this.place : this.wanted };
   }
@@ -70,7 +70,7 @@ class Hand {
     lab.changed();
   }
 
-  /// The next one, or the last.
+  /// Takes the bob before the held one; the last bob if none is held.
   takeNext() {
     const { count } = this.lab.stage;
     this.take(this.isHolding ? (this.bob + count - 1) % count : count - 1, 0, 0);
@@ -94,7 +94,7 @@ class Hand {
     this.lab.changed();
   }
 
-  /// Goes where it is wanted, without jerks: critically damped, within a few hundredths of a second.
+  /// Moves to the wanted place smoothly: critically damped, within a few hundredths of a second.
   move(passed) {
     if (!this.isHolding || !(this.lab.playing || this.throws)) return;
     const rate = 40;
@@ -110,14 +110,14 @@ class Hand {
     if (this.throws) this.#pose(this.place);
   }
 
-  /// What the engine is told: components of the chain's space.
+  /// The hand for the engine, with the components of the chain's space.
   told(space) {
     if (!this.isHolding) return null;
     const of = ([x, y, z]) => (space === 2 ? [x, z] : [x, y, z]);
     return { bob: this.bob, place: of(this.place), speed: of(this.speed) };
   }
 
-  // At rest, and where the hand is.
+  // Sets the state at rest with the bob at the hand.
   #pose(place) {
     const { state, row, size } = this.lab;
     if (model) {
@@ -153,7 +153,7 @@ class Hand {
     if (model) {
       await this.posing;
       if (throws) await this.#poseModel(bob, this.place, this.speed);
-      else if (this.isPosed) await this.#poseModel(bob, this.wanted); // where the hand was last
+      else if (this.isPosed) await this.#poseModel(bob, this.wanted); // at the last place of the hand
       if (order !== lab.order || this.isHolding) return;
     }
     if (this.isPosed) {
@@ -163,11 +163,11 @@ class Hand {
       lab.play(model ? this.wasPlaying : false);
       lab.controls.refresh();
     } else if (lab.playing) {
-      // What follows is a motion of its own, from here on.
+      // From here on it is a new motion.
       const { rows, rowSize, numbers } = lab.history;
       const last = numbers.subarray((rows - 1) * rowSize, rows * rowSize);
       lab.startsAt(last);
-      if (isDriven(lab.state)) [lab.state.t] = last; // what drives it does not begin again
+      if (isDriven(lab.state)) [lab.state.t] = last; // drives go on at this time
       lab.controls.refresh();
       lab.looks.writeLink();
     }
@@ -176,7 +176,7 @@ class Hand {
   }
 }
 
-/// What pointers take on the stage: a ball, or an end of the ruler.
+/// Lets pointers on the stage take a bob, or an end of the ruler.
 function watchHand(lab) {
   const { stage, hand } = lab;
   const { classList } = stage.canvas;

@@ -1,9 +1,9 @@
-// What was computed: rows, one after the other, the newest ones where there are too many.
+// The computed rows. Where there are too many, the newest ones.
 
 const mostBytes = 96e6;
 
 class History {
-  /// tipOf(row) is where the last point is, [x, y, z]: kept beside the rows, for its trace.
+  /// tipOf(row) returns the place of the last point, [x, y, z], which is kept beside the rows, for its trace.
   constructor(tipOf) {
     this.tipOf = tipOf;
     this.clear(1);
@@ -40,13 +40,13 @@ class History {
     }
   }
 
-  /// Forgets what is later than a time.
+  /// Removes the rows after a time.
   cut(time) {
     while (this.rows > 0 && this.time(this.rows - 1) > time + 1e-9) --this.rows;
     ++this.version;
   }
 
-  // The older half goes where memory is full.
+  // Drops the older half if memory is full.
   #grow(needed) {
     if (8 * needed > mostBytes) {
       const half = this.rows >> 1;

@@ -1,4 +1,4 @@
-// Buttons, keys, pointers: what a person does, as what the laboratory is told.
+// Buttons, keys and pointers, and the calls of the laboratory that they lead to.
 
 class Keys {
   constructor(lab) {

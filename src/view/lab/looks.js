@@ -1,11 +1,11 @@
-// What the page looks like, as its state and its link say.
+// The looks of the page, by its state and its link.
 
 class Looks {
   constructor(lab) {
     this.lab = lab;
   }
 
-  /// Takes what the state says of looks.
+  /// Applies the looks in the state.
   read() {
     const { state } = this.lab;
     if (state.theme) document.documentElement.dataset.theme = state.theme;
@@ -71,12 +71,12 @@ class Looks {
     setTimeout(() => (at("link").textContent = text("link")), 1600);
   }
 
-  // Somebody typed another link.
+  // The user has typed another link.
   follow() {
     if (location.hash.slice(1) === linkOf(this.lab.state)) return;
     const words = location.hash.slice(1);
     if (new URLSearchParams(words).get("model") !== named || movedBy(words) !== moved) {
-      location.reload(); // something else moves
+      location.reload(); // another system
       return;
     }
     this.lab.state = stateOf(location.hash.slice(1));

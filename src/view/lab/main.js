@@ -31,7 +31,7 @@ class Lab {
     this.controls.make();
     new Keys(this);
     this.stage.resize();
-    this.#draw(); // what is at the start needs no module
+    this.#draw(); // the start needs no module
     performance.mark("pendula first frame");
     requestAnimationFrame((now) => this.#frame(now));
     await this.computer.start();
@@ -58,7 +58,7 @@ class Lab {
     return this.units.map((unit) => unit === "rad");
   }
 
-  // The shape of what is drawn, and its first row, from the state alone.
+  // Sets the shape of the stage and the first row, from the state alone.
   #begin() {
     const { state, stage } = this;
     if (model) {
@@ -78,7 +78,7 @@ class Lab {
   #points = null;
   #shape = null;
 
-  /// Sends what moves to the worker, from the present row or the start.
+  /// Sends the system to the worker, with the present row as its start.
   async send() {
     const { state } = this;
     const start = { time: this.shown, q: Float64Array.from(this.row.subarray(1, 1 + this.size)), v: Float64Array.from(this.row.subarray(1 + this.size, 1 + 2 * this.size)) };
@@ -113,7 +113,7 @@ class Lab {
     }
   }
 
-  // Σ M g l of a chain, as in the program's summaries; otherwise the energies themselves.
+  // The scale of energies: Σ M g l of a chain, as in the program's summaries; otherwise the energies themselves.
   #scaleOf(kinetic, potential) {
     const { m, l, g, n } = this.state;
     let [below, sum] = [0, 0];
@@ -121,14 +121,14 @@ class Lab {
     return sum || [Math.abs(kinetic), Math.abs(potential)].filter((each) => each > 1e-12).sort((a, b) => b - a)[0] || 1;
   }
 
-  /// Changes numbers of what moves; the motion goes on from where it is shown.
+  /// Changes numbers of the system; the motion goes on from the shown state.
   change(numbers) {
     Object.assign(this.state, numbers);
     this.#reshape();
     this.later();
   }
 
-  /// Another number of links, or another space: from the start.
+  /// Sets another number of links, or another space, and starts again.
   setLinks(n, space) {
     Object.assign(this.state, { n, space });
     resize(this.state);
@@ -137,13 +137,13 @@ class Lab {
     for (const panel of this.panels) panel.begin?.();
   }
 
-  /// Goes to another start, and begins there.
+  /// Sets another start, and begins there.
   startFrom(numbers) {
     Object.assign(this.state, numbers);
     this.again();
   }
 
-  /// Something else moves, of so many links: the page begins again, with the same looks.
+  /// Another system, with this number of links: reloads the page, with the same looks.
   go(name, links = 0) {
     const { level, lang, theme } = this.state;
     const looks = Object.entries({ level, lang, theme }).filter(([, value]) => value).map(([key, value]) => `&${key}=${value}`);
@@ -151,7 +151,7 @@ class Lab {
     location.hash = `model=${name || ""}${links ? `&n=${links}` : ""}${looks.join("")}`;
   }
 
-  /// Begins again where the link begins.
+  /// Begins again at the start of the link.
   again() {
     this.hand.letGo();
     this.#begin();
@@ -159,7 +159,7 @@ class Lab {
     this.panels.forEach((panel) => panel instanceof SectionPanel && panel.begin());
   }
 
-  /// What was computed is no more.
+  /// Drops all computed rows.
   restart() {
     this.shown = this.clock = this.state.t;
     this.history.clear(this.history.rowSize);
@@ -173,7 +173,7 @@ class Lab {
     if (row.length >= this.row.length) this.row = row;
   }
 
-  // Sliders move faster than the worker begins.
+  // Sends the state a little later: sliders move faster than the worker can begin.
   later() {
     this.isDue = true;
     this.looks.writeLink();
@@ -211,7 +211,7 @@ class Lab {
   // --- Time ---
 
   play(on = !this.playing) {
-    if (this.playing && !on) this.clock = this.shown; // where the computing is late, the clock is ahead of it
+    if (this.playing && !on) this.clock = this.shown; // the clock may be ahead of the computed rows
     this.playing = on;
     this.last = null;
     document.documentElement.classList.toggle("playing", on);
@@ -229,7 +229,7 @@ class Lab {
     this.changed();
   }
 
-  /// One sixtieth of a second, back or on; at the end more is computed.
+  /// Steps by one sixtieth of a second, back or forth; at the end more rows are computed.
   step(way) {
     this.play(false);
     const target = this.clock + way / 60;
@@ -255,7 +255,7 @@ class Lab {
     }).catch((error) => order === this.order && this.#fail(error)).finally(() => (this.asked = false));
   }
 
-  // The hand changes the energy: what it is measured from is now.
+  // The hand changes the energy: from now on, energy errors are relative to the present one.
   #rebase() {
     const { history, size } = this;
     const row = history.rows - 1;
@@ -297,7 +297,7 @@ class Lab {
     at("trouble").textContent = words;
   }
 
-  /// Places of the points in the last quarter of a second of the clock on the wall, the newest first; none when paused.
+  /// Places of the points in the last quarter of a second of wall time, the newest first; none when paused.
   placesBefore() {
     const { history, stage, state, size } = this;
     if (!this.playing || history.rows === 0) return [];
@@ -307,7 +307,7 @@ class Lab {
     });
   }
 
-  /// The motion begins with a row.
+  /// Makes a row the start of the motion.
   startsAt(row) {
     const { size } = this;
     this.state.q = Array.from(row.subarray(1, 1 + size));
@@ -354,10 +354,10 @@ class Lab {
     if (this.playing && panel.isSeen) panel.draw();
     if (!this.playing) for (const each of this.panels) if (each.isSeen) each.draw();
     this.#writeTime();
-    if (this.shown > 12) at("hint").classList.add("gone"); // whoever looks on needs it no more
+    if (this.shown > 12) at("hint").classList.add("gone"); // after some seconds it is not needed
   }
 
-  // The way of the last point, of 3 seconds at most, to where it is now.
+  // The trace of the last point, up to the shown time, of 3 seconds at most.
   #trace() {
     const { history, stage } = this;
     if (history.rows < 2) return null;
@@ -396,5 +396,5 @@ lab.start().catch((error) => {
   at("trouble").hidden = false;
   at("trouble").textContent = text("trouble", { what: error.message });
 });
-// Tests, and whoever embeds the page, may look.
+// For tests, and for pages that embed this one.
 window.pendulaLab = lab;

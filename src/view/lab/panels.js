@@ -1,4 +1,4 @@
-// The panels beside the stage. Each is drawn some times a second, one after the other, so that no frame draws all.
+// The panels beside the stage. Each is drawn a few times a second, in turn, so that no frame draws all of them.
 
 const windowOfTime = 20; // s that panels over time show
 
@@ -38,7 +38,7 @@ class Panel {
     return bottom > 0 && top < innerHeight;
   }
 
-  /// What runs is to be seen, and can be stopped, at every level.
+  /// Starts or stops. A running panel is shown at every level, so that it can be stopped.
   run(on) {
     const { button, box, key } = this;
     box.section.classList.toggle(box.level, !on);
@@ -59,7 +59,7 @@ class Panel {
     nameCurves(this.box.keys, curves.filter(([colour]) => colour), ...curves.filter(([colour]) => !colour).map(([, words]) => words));
   }
 
-  /// Rows of the window up to the time that is shown: from, to, and the stride that leaves few enough.
+  /// Rows of the window up to the shown time: from, to, and a stride that leaves at most `most`.
   rows(most = 600) {
     const { history, shown } = this.lab;
     const to = history.rowAt(shown);
@@ -75,14 +75,14 @@ class Panel {
     return linearTicks(this.axes.x, this.axes.mostTicks);
   }
 
-  /// Over the window.
+  /// Draws a curve over the window.
   curve(pen, colour, value, width = 1.5) {
     pen.strokeStyle = colour;
     pen.lineWidth = width;
     drawCurve(pen, this.axes, this.rows(2400), (row) => this.lab.history.time(row), value, { isOverTime: true });
   }
 
-  /// `scale`: with what rounding of the values compares.
+  /// The range of values over the window; `scale` is that of their rounding.
   range(values, scale) {
     let [low, high] = [Infinity, -Infinity];
     const { from, to, stride } = this.rows(2400);
@@ -116,7 +116,7 @@ class EnergyPanel extends Panel {
     const colours = [1, 0, 5].map((k) => rgba(palette.curves[k]));
     values.forEach((value, k) => this.curve(pen, colours[k], value, k === 2 ? 2.2 : 1.6));
     pen.restore();
-    const digits = clamp(2 - Math.floor(Math.log10(lab.energyScale)), 0, 6); // three of the pendulum's energy
+    const digits = clamp(2 - Math.floor(Math.log10(lab.energyScale)), 0, 6); // three digits of the pendulum's energy
     const now = [lab.row[kinetic], lab.row[potential], lab.row[kinetic] + lab.row[potential]].map((x) => `${steady(x, digits)} J`);
     const names = ["kinetic", "potential", "total"].map((key, k) => `${text(key)} ${now[k]}`);
     this.name(...names.map((name, k) => [colours[k], name]));
@@ -124,7 +124,7 @@ class EnergyPanel extends Panel {
   }
 }
 
-/// What acts from outside: what is held and sines, since they were last changed.
+/// Inputs, constant parts and sines, since they were last changed.
 class InputsPanel extends Panel {
   constructor(lab) {
     super(lab, labPanel("panel.inputs", "student"));
@@ -155,7 +155,7 @@ class InputsPanel extends Panel {
   }
 }
 
-/// How far the energy is from where it was when last something was changed.
+/// The energy error since the last change of anything.
 class ErrorPanel extends Panel {
   constructor(lab) {
     super(lab, labPanel("panel.error", "all"));
@@ -226,13 +226,13 @@ class PhasePanel extends Panel {
 /// A whole turn, and room for its numbers.
 const turnOfAngles = { low: -1.06 * Math.PI, high: 1.06 * Math.PI };
 
-/// Angles in degrees, other numbers as they are.
+/// Ticks: wrapped angles in degrees, other numbers as they are.
 function degreeTicks(axis, count, wrapped) {
   if (!wrapped) return linearTicks(axis, count, false);
   return [-180, -90, 0, 90, 180].map((k) => ({ at: (k * Math.PI) / 180, text: `${steady(k, 0)}°` }));
 }
 
-/// Where the first coordinate goes through zero upwards: the last one and its rate.
+/// A Poincaré section: the last coordinate and its rate where the first one goes through zero upwards.
 class SectionPanel extends Panel {
   constructor(lab) {
     super(lab, labPanel("panel.section", "all", [], "square"));
@@ -245,7 +245,7 @@ class SectionPanel extends Panel {
     this.version = -1;
   }
 
-  /// Rows that came since.
+  /// Takes the rows since the last call.
   collect() {
     const { history, size } = this.lab;
     if (this.version !== history.version) {
@@ -286,7 +286,7 @@ class SectionPanel extends Panel {
   }
 }
 
-/// What runs beside the motion for as long as one wants: a number that grows with time, [time, number] each.
+/// A computation beside the motion that the user starts and stops: numbers over time, [time, number] each.
 class RunningPanel extends Panel {
   values = [];
 
@@ -325,7 +325,7 @@ class RunningPanel extends Panel {
   }
 }
 
-/// Copies that start beside the motion, and how far they get from it.
+/// Copies that start beside the motion, and their distance from it.
 class CopiesPanel extends RunningPanel {
   apart = 0.05;
 

@@ -1,6 +1,6 @@
-// Where points are, and how fast, from rows: t, coordinates, rates, energies, and of models points and their velocities.
+// Places and velocities of points from rows: t, coordinates, rates, energies, and for models points and their velocities.
 
-/// Sums of vectors along a chain, three numbers each: what is in the plane is in x and z.
+/// Sums of vectors along a chain, three numbers each; in the plane x and z are used.
 function summed(vectors, out) {
   let [x, y, z] = [0, 0, 0];
   vectors.forEach((each, i) => {
@@ -14,7 +14,7 @@ function placesOfChain({ space, l }, q, places) {
   return summed(rodsOfAngles(space, l, q), places);
 }
 
-/// Places of a model's points from their columns: what is in the plane is in x and z.
+/// Places of a model's points from their columns; in the plane x and z are used.
 function placePoints(points, places) {
   let k = 0;
   model.points.forEach((point, i) => {

@@ -1,17 +1,17 @@
-// The state of the laboratory, and how it stands in a link.
+// The state of the laboratory, and its form in a link.
 
 const levels = ["first", "student", "all"];
 const speedChoices = [1 / 32, 1 / 16, 1 / 8, 1 / 4, 1 / 2, 1, 2, 4];
-const mostLinks = 300; // this bound, and those of stateOf, are told in view/lab.hpp, too
+const mostLinks = 300; // view/lab.hpp has this bound, and those of stateOf, too
 const listed = 4; // links whose numbers have sliders of their own
 
-/// Numbers of a model that is no chain, as describe tells them, link by link.
+/// Parameters of a model, from `pendula describe`, link by link.
 const modelParameters = (model?.parameters ?? []).flatMap((each) => {
   const count = each.per_link ? model.links : 1;
   return Array.from({ length: count }, (_, k) => ({ ...each, label: () => parameterWords(each, k) }));
 });
 
-/// What a parameter is called: those of built-in models by words, others as their file has them.
+/// The label of a parameter: words for built-in models, else the name in the model's file.
 function parameterWords({ name, per_link }, k) {
   const key = `parameter.${name}`;
   const words = models[named] && key in texts.en ? text(key) : name;
@@ -25,7 +25,7 @@ const freshState = () => ({
   q: model ? (moved.start?.q ?? model.coordinates.map((_, k) => (k === model.coordinates.length - 1 ? 1 : 0.1))) : [2.0943951023931953, 2.6179938779914944],
   v: model ? (moved.start?.v ?? model.coordinates.map(() => 0)) : [0, 0],
   p: modelParameters.map((each) => moved.start?.p?.[each.name] ?? each.default ?? 1),
-  u: model ? model.inputs.map(() => 0) : [0, 0], // inputs that are held; of a chain torques, link by link
+  u: model ? model.inputs.map(() => 0) : [0, 0], // constant parts of inputs; torques of a chain, link by link
   s: [], // sines on them: [input, amplitude, frequency, phase]
   speed: 1, level: "student", lang: "", theme: "", copies: 0, apart: 1e-6,
   show: ["trace"],
@@ -38,7 +38,7 @@ function numbersOf(words, n) {
   return Array.from({ length: n }, (_, k) => numbers[Math.min(k, numbers.length - 1)]);
 }
 
-/// Sines on inputs, from four numbers each; null where they make no sense.
+/// Sines on inputs, from four numbers each; null if they make no sense.
 function sinesOf(words, inputs) {
   const numbers = words.split(",").map(Number);
   if (numbers.length % 4 !== 0 || !numbers.every(Number.isFinite)) return null;
@@ -46,17 +46,17 @@ function sinesOf(words, inputs) {
   return sines.every(([input]) => Number.isInteger(input) && input >= 0 && input < inputs) ? sines : null;
 }
 
-/// Those that do something.
+/// The sines with an amplitude that is not 0.
 function actingSines(state) {
   return state.s.filter(([, amplitude]) => amplitude !== 0);
 }
 
-/// Whether the energy changes by what acts from outside.
+/// Whether inputs change the energy.
 function isDriven(state) {
   return state.u.some((each) => each !== 0) || actingSines(state).length > 0;
 }
 
-/// The state that a link tells; what it does not tell, or tells wrongly, is as at first.
+/// The state of a link; missing or wrong parts have their defaults.
 function stateOf(words) {
   const state = freshState();
   const told = new URLSearchParams(words);
@@ -96,7 +96,7 @@ function stateOf(words) {
   return state;
 }
 
-/// Makes all lists of a chain as long as it has links; angles stay with their links.
+/// Adapts all lists of a chain to its number of links; links keep their angles.
 function resize(state) {
   if (model) return;
   const { n, space } = state;
@@ -105,7 +105,7 @@ function resize(state) {
   const [theta, phi] = [state.q.slice(0, before), state.q.slice(before)];
   const [turn, around] = [state.v.slice(0, before), state.v.slice(before)];
   state.m = grown(state.m, n, () => state.m.at(-1));
-  // Long chains are as long as short ones: what hangs stays on the stage.
+  // Long chains get the total length of short ones, so that they stay on the stage.
   const length = state.l.reduce((sum, each) => sum + each, 0);
   if (n !== before && (n > listed || before > listed)) state.l = Array.from({ length: n }, () => Number((length / n).toPrecision(4)));
   else state.l = grown(state.l, n, () => state.l.at(-1));
@@ -122,7 +122,7 @@ function resize(state) {
   }
 }
 
-/// The words of a link that leads to a state.
+/// The words of the link to a state.
 function linkOf(state) {
   const words = [];
   const fresh = freshState();
@@ -148,7 +148,7 @@ function linkOf(state) {
   return words.join("&");
 }
 
-/// What the engine is told of a state.
+/// The description of a state's system for the engine.
 function specOf(state) {
   const acting = { inputs: state.u, sines: actingSines(state) };
   if (model) {

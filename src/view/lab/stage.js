@@ -1,16 +1,16 @@
-// The stage of the laboratory: its motion, copies beside it, and what is to be seen at them: velocities, angles, a ruler, the hand.
+// The stage of the laboratory: its motion and copies beside it, with velocities, angles, a ruler and the hand.
 
 class Bench extends Stage {
   ruler = { from: [-0.5, -0.4, 0], to: [0.5, -0.4, 0] };
 
-  /// Besides what a stage is told: `arms` that turn from the vertical, [from, to].
+  /// As Stage.shape, with `arms` that turn from the vertical, [from, to].
   shape(told) {
     super.shape({ ...told, low: [-1, -1, -1].map((x) => x * told.reach), high: [1, 1, 1].map((x) => x * told.reach) });
     this.places = new Float64Array(3 * this.count);
   }
 
-  /// The point that is nearest to a pixel, -1 where none is near. `before`: places of some moments ago, the newest first:
-  /// whoever reaches for a fast ball presses where it was.
+  /// The point that is nearest to a pixel; -1 if none is near. `before`: places of some moments ago, the newest first, since
+  /// a press for a fast bob comes where it was.
   pointAt(pixelX, pixelY, most = 26, before = []) {
     for (const places of [this.places, ...before]) {
       let [found, nearest] = [-1, most];
@@ -143,7 +143,7 @@ function anglesOf(space, arms, places) {
   });
 }
 
-/// How a model is drawn; `seen` is what the engine knows of its shape, null before it does.
+/// The shape of a model for the stage; `seen` is the engine's shape of it, or null before that is known.
 function shapeOf(model, seen) {
   const { connections } = model;
   const kinds = model.points.map((point) => point.kind);

@@ -1,13 +1,13 @@
-// What the page begins with, its texts, and what the scripts of other pages expect to find.
+// The start of the page, its texts, and names that the scripts shared with other pages expect.
 
 const beginning = JSON.parse(document.getElementById("start").textContent);
 const texts = JSON.parse(document.getElementById("texts").textContent);
 
-// Built-in models: how many links each has at `first`, and what is `made` of it, by number of links.
+// Built-in models: the number of links of each at `first`, and the `made` ones by number of links.
 const models = JSON.parse(document.getElementById("models").textContent);
 const chainAlone = {};
 
-/// What the words of a link say that moves: a built-in model, or what the page was written for.
+/// The system in the words of a link: a built-in model, or the one that the page was written for.
 function movedBy(words) {
   const told = new URLSearchParams(words);
   const family = models[told.get("model")];
@@ -22,7 +22,7 @@ const linkChoices = Object.keys(models[named]?.made ?? {}).map(Number);
 
 const at = (id) => document.getElementById(id);
 
-// Plots and colours of other pages are of runs; here there is one motion, which grows.
+// Plots and colours of other pages expect runs; here there is one motion, which grows.
 const scene = { timeUnit: "s", lengthUnit: "m" };
 const runs = [null];
 
@@ -43,7 +43,7 @@ function writeTexts(chosen) {
   for (const each of document.querySelectorAll("[data-label][type=button]")) each.title = text(each.dataset.label);
 }
 
-/// Tells those who hear the page.
+/// Lets a screen reader say words.
 function say(words) {
   at("said").textContent = words;
 }

@@ -10,7 +10,7 @@ function rodsOfAngles(space, lengths, q) {
   });
 }
 
-/// Their velocities.
+/// Velocities of a chain's rods.
 function ratesOfRods(space, lengths, q, v) {
   const n = lengths.length;
   return Array.from(lengths, (length, i) => {

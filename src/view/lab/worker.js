@@ -1,6 +1,6 @@
-// What the worker is told, and what it answers.
+// Orders to the worker, and its answers.
 
-/// So long may rows take before the page is answered [ms].
+/// Longest time for rows before the worker answers [ms].
 const mostWork = 25;
 
 let engine = null;
@@ -12,7 +12,7 @@ const orders = {
     return { ready: true };
   },
 
-  /// Something else moves, or from elsewhere.
+  /// Begins another motion.
   begin({ spec, start, copies, apart, measure }) {
     engine.begin(spec, start);
     if (copies) engine.copy(copies, apart);
@@ -30,14 +30,14 @@ const orders = {
     return {};
   },
 
-  /// A point at a place, with a speed there.
+  /// Finds a state with a point at a place, at a speed.
   pose({ q, time, first, place, speed }) {
     const posed = engine.pose(q, first, place, time);
     const v = speed.some((each) => each !== 0) ? engine.ratesFor(posed, first, speed, time) : new Float64Array(q.length);
     return { q: posed, v, points: engine.pointsAt(posed, time), rates: engine.pointRates({ time, q: posed, v }) };
   },
 
-  /// Rows up to a time.
+  /// Computes rows up to a time.
   advance({ until, hand }) {
     const began = performance.now();
     const rows = [];
@@ -56,7 +56,7 @@ const orders = {
   },
 };
 
-// One after the other: the first one takes a while.
+// Orders are done one after the other: the first one takes a while.
 let before = Promise.resolve();
 self.onmessage = ({ data }) => {
   before = before.then(async () => {

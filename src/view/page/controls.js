@@ -1,8 +1,8 @@
-// Buttons, keys, dialogs: what a person does, as what the player and the stage are told.
+// Buttons, keys and dialogs, and the calls of player and stage that they lead to.
 
 const at = (id) => document.getElementById(id);
 
-/// What is said aloud by a screen reader.
+/// Text that a screen reader says aloud.
 function say(text) {
   at("said").textContent = text;
 }
@@ -155,13 +155,13 @@ class Controls {
   }
 }
 
-/// After the scenario, without its folder.
+/// The name of the CSV file: that of the scenario, without its folder.
 function csvName() {
   const stem = scene.title.replace(/^.*[\\/]/, "").replace(/\.toml$/, "");
   return `${stem || "run"}.csv`;
 }
 
-/// To the clipboard, where the browser lets a file of the disk do so; otherwise by the old way.
+/// Copies to the clipboard; where the browser does not allow that for a file of the disk, by the older call.
 async function copy(text, button) {
   const before = button.textContent;
   try {

@@ -1,8 +1,8 @@
 // Curves on canvases.
 
-const closest = 4; // pixels from one turn of a line to the one after the next that are told apart
+const closest = 4; // least pixels of a line's up and down that can be seen
 
-/// The envelope of a line that goes up and down faster than that: {x, low, high, mean} in pixels; else nothing.
+/// The envelope of a line that goes up and down faster than that: {x, low, high, mean} in pixels; empty for other lines.
 function bandOf(points) {
   let turns = 0;
   for (let k = 2; k < points.length; ++k) {
@@ -19,7 +19,7 @@ function bandOf(points) {
   return band.map(({ x, low, high, sum, count }) => ({ x, low, high, mean: sum / count }));
 }
 
-/// A line through pixels; over time, where it would go up and down too fast to be seen, the band that it stays in, and its mean.
+/// Draws a line through pixels. Over time, if it goes up and down too fast to be seen, the band that it stays in, and its mean.
 function drawLine(pen, points, isOverTime) {
   const band = isOverTime ? bandOf(points) : [];
   if (band.length) {
@@ -37,7 +37,7 @@ function drawLine(pen, points, isOverTime) {
   pen.stroke();
 }
 
-/// What rows have at x(row), y(row), with gaps where that is no number, and where an angle, number `wrapped` of the two, goes round.
+/// Draws rows at x(row), y(row), with gaps where one is no number, and where the angle with index `wrapped` of the two jumps.
 function drawCurve(pen, axes, { from, to, stride = 1 }, x, y, { wrapped = -1, isOverTime = false } = {}) {
   let [piece, before] = [[], null];
   for (let row = from; row <= to; row += stride) {

@@ -9,7 +9,7 @@ class Run {
 
   constructor(described, base64) {
     Object.assign(this, described);
-    this.label = described.label.replace(/^\w+(?= \+ )/, symbol); // a copy: where it starts
+    this.label = described.label.replace(/^\w+(?= \+ )/, symbol); // labels of copies tell their start, "theta_1 + …"
     const bytes = bytesOfBase64(base64);
     let offset = 0;
     const take = (Kind) => {
@@ -26,7 +26,7 @@ class Run {
     this.stepSizes = described.steps ? take(Float32Array) : null;
   }
 
-  /// The numbers of a column, undefined where the page has not got them.
+  /// The numbers of a column; undefined if the page does not have them.
   column(index) {
     return index === 0 ? this.t : this.#columns.get(index);
   }
@@ -43,7 +43,7 @@ class Run {
     return lastBy(time, this.rows, (row) => this.t[row]);
   }
 
-  /// The rows as text, those columns that the page has: all 17 digits of doubles, the 9 that tell a float.
+  /// The rows as text, with the columns that the page has: 17 digits of doubles, 9 of floats.
   csv() {
     const held = scene.columns.map((name, index) => ({ name, numbers: this.column(index) })).filter((c) => c.numbers);
     const lines = [held.map((c) => c.name).join(",")];
@@ -54,7 +54,7 @@ class Run {
     return `${lines.join("\n")}\n`;
   }
 
-  /// What was left out of the run, in a sentence; empty where nothing was.
+  /// How the run was thinned, in a sentence; empty if it was not.
   get thinning() {
     if (this.stride === 1) return "";
     return `Thinned: every ${ordinal(this.stride)} of ${this.seen} rows, and the last.`;
@@ -71,7 +71,7 @@ const groups = (() => {
     if (!byKind.has(stem)) byKind.set(stem, { unit, isAngle, isLink: scene.lengths.length > 0, stem, members: [] });
     byKind.get(stem).members.push({ name, column, rate });
   });
-  // With what rounding of a coordinate compares: what those of its kind get to, of lengths points too.
+  // The scale of a coordinate's rounding: the largest coordinate of its kind; for lengths, of points, too.
   const largest = (columns) => columns.reduce((most, column) => (runs[0].column(column) ?? []).reduce((m, x) => Math.max(m, Math.abs(x) || 0), most), 0);
   const farthest = largest(scene.points.flatMap(([, first, components]) => Array.from({ length: components }, (_, axis) => first + axis)));
   const duration = runs[0].end - runs[0].start || 1;

@@ -24,8 +24,8 @@ function readable(x, digits = 4) {
   return text.replaceAll("-", "−");
 }
 
-/// A number that changes while it is read: always as many digits after the point. What rounding alone moves does not change
-/// them, and zero has no sign.
+/// A number that changes while it is read: always with the same number of digits after the point. Rounding errors do not
+/// change them, and zero has no sign.
 function steady(x, digits = 2) {
   const text = Number(x.toFixed(digits + 6)).toFixed(digits);
   return Number(text) === 0 ? text.replace("-", "") : text.replace("-", "−");
@@ -53,7 +53,7 @@ function lowered(digits) {
   return [...digits].map((c) => "₀₁₂₃₄₅₆₇₈₉"[c]).join("");
 }
 
-/// theta_12 as θ₁₂, torque_y_1 as τ₁ (y): what a plot calls a coordinate or an input.
+/// theta_12 as θ₁₂, torque_y_1 as τ₁ (y): the name of a coordinate or an input in plots.
 function symbol(name) {
   const greek = { theta: "θ", phi: "φ", psi: "ψ", alpha: "α", beta: "β", gamma: "γ", torque: "τ" };
   const [stem, ...rest] = name.split("_");
@@ -84,7 +84,7 @@ function niceTicks(low, high, count, least = 0) {
   return ticks.length < least ? of(steps[coarse - 1] * power) : ticks;
 }
 
-/// The last of `count` in the order of their times that is not later than a time, the first where all are.
+/// The index of the last of `count` entries, ordered by time, that is not later than a time; 0 if all are later.
 function lastBy(time, count, timeOf) {
   let low = 0;
   let high = count - 1;

@@ -1,7 +1,7 @@
-// Mouse and touch on a stage: what they take hold of, and turning, moving and zooming.
+// Mouse and touch on a stage: dragging things, and turning, moving and zooming the view.
 
-/// `take(event, x, y)` says whether a pointer holds something there: it is told of each `drag(x, y)`, and `drop()`; all others
-/// change the view, and `changed()` is called. `pass(event, x, y)` is told of pointers that press nothing.
+/// `take(event, x, y)` returns whether a pointer takes something there: then drag(x, y) and drop() follow. Other pointers change
+/// the view, and changed() is called. pass(event, x, y) is called for pointers that press nothing.
 function watchGestures(stage, { changed, take = () => false, drag, drop, pass = () => {} }) {
   const { canvas } = stage;
   const fingers = new Map();
@@ -61,7 +61,7 @@ function watchGestures(stage, { changed, take = () => false, drag, drop, pass = 
   }, { passive: false });
 }
 
-/// Makes a canvas as fine as the screen, at most two pixels to one of CSS; says whether that changed anything.
+/// Makes a canvas as fine as the screen, at most two pixels to one of CSS. Returns whether its size changed.
 function fitCanvas(canvas, width, height) {
   const scale = Math.min(window.devicePixelRatio || 1, 2);
   const [w, h] = [Math.max(1, Math.round(width * scale)), Math.max(1, Math.round(height * scale))];

@@ -1,4 +1,4 @@
-// Goes on from what is shown in a laboratory: another page, which this one carries.
+// Opens the laboratory, a page contained in this one, at the state that is shown.
 
 /// The state of the first run at a time, as the words of a laboratory's link.
 function laboratoryLink(time) {
@@ -16,7 +16,7 @@ function laboratoryLink(time) {
   return [scene.laboratory, ...[...words].map(([key, numbers]) => `${key}=${numbers.join(",")}`)].join("&");
 }
 
-/// Opens it in a window of its own, paused at the state of a time.
+/// Opens the laboratory in a window of its own, paused at the state of a time.
 function openLaboratory(time) {
   const page = JSON.parse(document.getElementById("laboratory").textContent);
   const address = URL.createObjectURL(new Blob([page], { type: "text/html" }));

@@ -1,4 +1,4 @@
-// The stage of systems without points: their coordinates, each in a lane of its own, as far as time has come.
+// The stage of systems without points: each coordinate in a lane of its own, up to the time that is shown.
 
 class Lanes {
   constructor(host) {

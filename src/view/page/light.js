@@ -1,18 +1,18 @@
-// Light in space: how bright what faces some way is, and pictures of balls in it.
+// Light in space: the brightness of a surface by its direction, and pictures of bobs in that light.
 
 const unit = (vector) => vector.map((x) => x / Math.hypot(...vector));
 const dotOf = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 
-/// Where the sun stands; it throws the shadows.
+/// The direction to the sun, which throws the shadows.
 const sun = [0.35, -0.25, 1];
 const sunward = unit(sun);
 const sideward = unit([-1, 0.6, 0.2]);
 
-/// Between the sun and the eye: what faces there mirrors the one to the other.
+/// The direction halfway between sun and eye: a surface that faces there mirrors the sun to the eye.
 const mirrorOf = (eye) => unit(sunward.map((x, axis) => x + eye[axis]));
 
-/// [light, gloss] of a surface by its outward normal: from the sky and back from the ground, from the sun, from the side;
-/// gloss (Blinn and Phong) about `mirror`. A colour is multiplied by the one, the other is added.
+/// [light, gloss] of a surface by its outward normal. Light comes from sky and ground, the sun, and the side; gloss (Blinn
+/// and Phong) is about `mirror`. A colour is multiplied by light, and gloss is added.
 function lightOn(normal, mirror) {
   const bySun = Math.max(dotOf(normal, sunward), 0);
   const light = 0.75 * (0.541 + 0.459 * (0.5 + 0.5 * normal[2])) + 0.6 * bySun + 0.2 * Math.max(dotOf(normal, sideward), 0);
@@ -24,13 +24,13 @@ function lit(rgb, [light, gloss]) {
   return rgb.map((c) => Math.min(Math.round(c * light + 255 * gloss), 255));
 }
 
-/// Pictures of balls as they are seen with some axes of the screen, by colour and size.
+/// Pictures of bobs, balls lit from the sun, for some axes of the screen, by colour and size.
 class BobPictures {
   #pictures = new Map();
   #axes = "";
-  #last = {}; // most balls are alike
+  #last = {}; // most bobs are alike
 
-  /// One at least `size` pixels wide, if it is not very large.
+  /// A picture that is at least `size` pixels wide, up to 256.
   of(rgb, size, axes) {
     const wide = size > 128 ? 256 : size > 64 ? 128 : size > 32 ? 64 : size > 16 ? 32 : 16;
     const last = this.#last;

@@ -1,6 +1,6 @@
 // Puts the parts together.
 
-/// What the page is about, and how much of it is here.
+/// Describes the runs of the page, and how many of their rows it has.
 function describePage() {
   const rows = (run) => (run.stride > 1 ? `every ${ordinal(run.stride)} of ${run.seen} rows` : `${run.rows} ${run.rows === 1 ? "row" : "rows"}`);
   const [first, second] = runs;
@@ -9,7 +9,7 @@ function describePage() {
   at("subtitle").textContent = [...parts, `pendula ${scene.version}`].join(" · ");
 }
 
-/// Whose colours are whose.
+/// The legend: the colour of each run.
 function drawLegend() {
   if (runs.length < 2) return;
   const mark = (colour) => Object.assign(element("i"), { style: `background: ${colour}` });
@@ -22,7 +22,7 @@ function drawLegend() {
   at("legend").replaceChildren(element("span", {}, `${runs[0].label} `, ramp, runs.at(-1).label));
 }
 
-/// Draws again what gets another size.
+/// Redraws stage and plots when their sizes change.
 function watchSizes(stage, host, panels) {
   new ResizeObserver(() => stage.resize()).observe(host);
   for (const each of panels) {
@@ -68,7 +68,7 @@ function start() {
   stage.draw(player.time, controls.trace);
   performance.mark("pendula first frame");
   requestAnimationFrame(frame);
-  // Motion starts by itself for those who do not mind motion.
+  // The motion starts by itself, unless the user has asked for reduced motion.
   if (!matchMedia("(prefers-reduced-motion: reduce)").matches) player.play(true);
 }
 

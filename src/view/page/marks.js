@@ -1,6 +1,6 @@
 // Events of the runs: marks on the line of time, and buttons that lead from one to the next.
 
-/// Half of the thumb of the line of time: its middle goes no further to the sides.
+/// Half the width of the thumb of the line of time: the middle of the thumb stays so far from both ends.
 const thumb = 8;
 
 /// All events of one name, of all runs: {name, count, isThinned, marks}. `marks` has {name, time, up} of each, in the
@@ -45,7 +45,8 @@ class Marks {
     this.#colourKey();
   }
 
-  /// To the nearest event after the time that is shown, or before it; of any name, or of one. Over the ends it goes round.
+  /// Goes to the next event after the time that is shown, or the last one before it; of any name, or of one. At the ends it
+  /// starts over.
   go(way, kinds = this.kinds) {
     const { player } = this;
     const marks = kinds.flatMap((kind) => kind.marks).sort((a, b) => way * (a.time - b.time));
@@ -56,7 +57,7 @@ class Marks {
     say(`${next.name}, ${next.up ? "up" : "down"}, at ${at("clock").textContent}`);
   }
 
-  // Upwards from the middle, or down.
+  // A mark upwards from the middle, or downwards.
   #draw(pen, width, height, time, up) {
     const { player } = this;
     const x = thumb + ((time - player.start) / (player.duration || 1)) * (width - 2 * thumb);

@@ -1,4 +1,4 @@
-// Where the points are at any time, between rows too.
+// Places of the points at any time, between rows, too.
 
 const origin = -1;
 const free = -2;
@@ -6,8 +6,8 @@ const free = -2;
 // Places have three numbers here; the components of a point in the plane are the first and the last of them.
 const components = scene.dimension === 2 ? [0, Infinity, 1] : [0, 1, 2];
 
-/// Vectors of one row: of a point that hangs on another by a rod, the rod; of any other its place. `hangs[i]` is the
-/// point that i hangs on, `origin`, or `free`.
+/// A row as vectors: the rod of a point that hangs on another by a rod; the place of any other. `hangs[i]` is the point
+/// that i hangs on, `origin`, or `free`.
 class Motion {
   #kept = new Map(); // a few rows at a time, by run and row
 
@@ -34,7 +34,7 @@ class Motion {
     return this.#hang(this.#vectors(run, row), places);
   }
 
-  // Cubic in time through four rows (Catmull and Rom, for rows that are not evenly spaced); rods keep their length.
+  // Interpolates by a cubic in time through four rows (Catmull and Rom, for uneven spacing); rods keep their length.
   #mix(run, row, time, out) {
     const last = run.rows - 1;
     const t = run.t;
@@ -91,7 +91,7 @@ class Motion {
     }
   }
 
-  // Of a chain: (sin θ cos φ, sin θ sin φ, −cos θ), by the lengths of its rods.
+  // Rods of a chain: (sin θ cos φ, sin θ sin φ, −cos θ), times their lengths.
   #fromAngles(run, row, vectors) {
     const each = scene.dimension - 1;
     for (let i = 0; i < this.count; ++i) {
@@ -103,8 +103,8 @@ class Motion {
     }
   }
 
-  // Whether a rod is between point i and the one before it: nothing else is, and it moves. Carts are on rails, weights hang on
-  // threads, floors lie.
+  // Whether a rod is drawn from `on` to point i: their distance is constant, no connection joins them, i is no cart or fixed
+  // pivot, and neither is a weight or a floor.
   #isRod(i, on) {
     if (kindOf(i) === "cart" || [i, on].some((each) => each >= 0 && ["weight", "floor"].includes(kindOf(each)))) return false;
     if (scene.connections.some(([, a, b]) => (a === i && b === on) || (a === on && b === i))) return false;
@@ -118,7 +118,7 @@ class Motion {
     return j >= 0 && k < scene.points[j][2] ? run.column(scene.points[j][1] + k)[row] : 0;
   }
 
-  // How far a point gets along each axis.
+  // The range of a point along each axis.
   #span(i) {
     return [0, 1, 2].map((axis) => {
       let [low, high] = [Infinity, -Infinity];
@@ -130,8 +130,8 @@ class Motion {
     });
   }
 
-  /// The direction in which a cart runs, a unit vector: from where it is at first to where it is farthest from that, x if it
-  /// rests; null if it leaves that line.
+  /// The direction of a cart's rail, a unit vector: from its first place to the farthest one; x if it rests; null if it does
+  /// not move on a line.
   railOf(i) {
     const run = runs[0];
     const from = (row) => [0, 1, 2].map((axis) => this.#place(i, axis, row) - this.#place(i, axis, 0));
@@ -149,7 +149,7 @@ class Motion {
     return along;
   }
 
-  // Whether point i stays where it is from the one before it, over the rows of the first run.
+  // Whether point i keeps its distance from the one before it, over the rows of the first run.
   #isRigid(i, on) {
     const run = runs[0];
     const distance = (row) => {
@@ -165,7 +165,7 @@ class Motion {
     return first > 0;
   }
 
-  // The box that all runs stay in, with the origin; from at most 500 rows a run. `reach` is what lengths compare with.
+  // Finds the box of all runs and the origin, from at most 500 rows a run. `reach` is the scale of lengths.
   #measure() {
     this.low = [0, 0, 0];
     this.high = [0, 0, 0];
@@ -203,7 +203,7 @@ class Motion {
     return path;
   }
 
-  /// What a stage is told.
+  /// The description for a stage.
   get shape() {
     const { hangs, low, high, reach } = this;
     const kinds = scene.points.map((_, i) => kindOf(i));

@@ -1,4 +1,4 @@
-// Colours: the style sheet's, as they come out in the light or the dark.
+// Colours of the style sheet, in the light or the dark theme.
 
 /// One colour of the style sheet as [red, green, blue], 0 to 255.
 function styleColour(name) {
@@ -9,7 +9,7 @@ function styleColour(name) {
   return parts;
 }
 
-/// All that drawings need; read again when the theme changes.
+/// All colours for drawings; read again when the theme changes.
 class Palette {
   constructor() {
     this.read();
@@ -27,8 +27,8 @@ class Palette {
     return rgba(this.rgb[name], alpha);
   }
 
-  /// The colour of a run: one of the curves where they are few, otherwise a place on a ramp from blue to yellow that is
-  /// told apart by brightness alone (after cividis).
+  /// The colour of a run: one of the curves' if there are few runs, otherwise from a ramp from blue to yellow whose colours
+  /// differ in brightness (after cividis).
   run(index) {
     if (runs.length === 1) return this.rgb.trace;
     if (runs.length <= this.curves.length) return this.curves[index];

@@ -6,7 +6,7 @@ function checkbox(text, checked, onChange) {
   return { node: element("label", {}, box, text), get on() { return box.checked; }, box };
 }
 
-/// Of one run each curve is named, of several the legend of the page names all.
+/// Names each curve of one run; for several runs the legend of the page has the names.
 function nameRuns(keys, curves, words) {
   nameCurves(keys, runs.length > 1 ? [] : curves.map((curve) => [rgba(curve.colour()), curve.name]), words);
 }
@@ -38,7 +38,7 @@ class LogPanel {
   }
 }
 
-/// Coordinates over time: of one run several, of several runs one.
+/// Coordinates over time: several of one run, or one of several runs.
 class CoordinatesPanel {
   constructor(player) {
     const refresh = () => this.refresh();
@@ -80,14 +80,14 @@ class CoordinatesPanel {
     nameRuns(this.box.keys, this.plot.curves, this.words);
   }
 
-  // Whether any angle goes round.
+  // Whether any angle makes a full turn.
   #turns() {
     const { members } = groups[0];
     return members.some(({ column }) => runs[0].column(column).some((angle) => Math.abs(angle) > 2 * Math.PI));
   }
 }
 
-/// What acts from outside over time, of one unit: of several runs one after the other.
+/// Inputs of one unit over time, for one run after the other.
 class InputsPanel {
   constructor(player, unit, inputs) {
     this.box = panel("Inputs");

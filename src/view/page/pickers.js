@@ -1,4 +1,4 @@
-// What a plot shows, chosen: a group of coordinates, and of it one member or several.
+// Menus for what a plot shows: a group of coordinates, and one or several of its members.
 
 const mostCurves = 6;
 
@@ -6,7 +6,7 @@ function option(value, text, selected = false) {
   return element("option", { value, textContent: text, selected });
 }
 
-/// Which group; nothing to see where there is one only.
+/// A menu of groups; hidden if there is only one.
 function groupPicker(name, onChange) {
   const select = element("select", {}, ...groups.map((group, k) => option(k, group.label)));
   select.setAttribute("aria-label", `${name}: which coordinates`);
@@ -15,7 +15,7 @@ function groupPicker(name, onChange) {
   return { node: select, get group() { return groups[select.value] ?? groups[0]; } };
 }
 
-/// A whole number from 1 to what `most` says.
+/// A field for a whole number from 1 to `most`.
 function numberPicker(label, start, onChange) {
   const input = element("input", { type: "number", min: 1, value: start, inputMode: "numeric" });
   input.setAttribute("aria-label", label);
@@ -31,7 +31,7 @@ function numberPicker(label, start, onChange) {
   };
 }
 
-/// One member of a group: by number in long chains, by name elsewhere.
+/// Picks a member of a group: by number in long chains, by name elsewhere.
 class MemberPicker {
   constructor(name, onChange) {
     this.groups = groupPicker(name, () => {
@@ -68,7 +68,7 @@ class MemberPicker {
   }
 }
 
-/// Several members of a group, from one to another; of many some, evenly.
+/// Picks several members of a group, from one to another; evenly spaced ones if there are many.
 class RangePicker {
   constructor(name, onChange) {
     this.groups = groupPicker(name, onChange);

@@ -26,7 +26,7 @@ class Plane {
     for (let x = left % step; x < width; x += step) pen.moveTo(Math.round(x) + 0.5, 0), pen.lineTo(Math.round(x) + 0.5, height);
     for (let y = top % step; y < height; y += step) pen.moveTo(0, Math.round(y) + 0.5), pen.lineTo(width, Math.round(y) + 0.5);
     pen.stroke();
-    // How long the side of a square of the grid is.
+    // A scale: the side of a square of the grid.
     const [x, y] = [width - 14, height - 14];
     pen.strokeStyle = pen.fillStyle = palette.css("quiet");
     pen.lineWidth = 1.5;
@@ -45,7 +45,7 @@ class Plane {
     return Math.max(1.5 * this.stage.radii[i] * this.stage.pixels, 4);
   }
 
-  // As far as one sees.
+  // Rails reach beyond the visible part.
   #drawRails({ places }) {
     const { stage } = this;
     const far = (stage.width + stage.height) / stage.pixels + Math.hypot(stage.view.x, stage.view.y) + stage.reach;
@@ -86,7 +86,7 @@ class Plane {
     else if (kind === "pivot") drawPivot(this.pen, place);
   }
 
-  // The last one in the colour of its trace; of faint figures only that one. Balls without shades are one path.
+  // The last bob has the colour of its trace; faint figures have only that one. Bobs without shades are one path.
   #drawBobs({ rgb, faint }, shown) {
     const { pen, stage } = this;
     const { count, kinds, radii, pixels } = stage;

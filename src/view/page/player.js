@@ -1,4 +1,4 @@
-// The time that is shown: who moves it, and who is told.
+// The time that is shown, its motion, and listeners to it.
 
 const speeds = [1 / 128, 1 / 64, 1 / 32, 1 / 16, 1 / 8, 1 / 4, 1 / 2, 1, 2, 4, 8, 16, 32, 64, 128];
 
@@ -24,7 +24,7 @@ class Player {
     this.#listeners.push(listener);
   }
 
-  /// Moves on by what has passed on the wall [ms]; says whether time moved.
+  /// Moves on to the wall time `now` [ms]. Returns whether time moved.
   advance(now) {
     const passed = this.#last === null ? 0 : Math.min(now - this.#last, 250); // a page that slept does not leap
     this.#last = this.playing ? now : null;
@@ -45,7 +45,7 @@ class Player {
     this.#tell("time");
   }
 
-  /// By whole rows of the first run.
+  /// Moves by whole rows of the first run.
   step(rows) {
     if (this.playing) this.play(false);
     const run = runs[0];

@@ -1,8 +1,8 @@
-// Plots against time, and of a rate against its coordinate: what does not change is drawn once, what moves on top.
+// Plots over time, and of a rate over its coordinate. Fixed parts are drawn once, moving ones on top of them.
 
 const plotMargin = { left: 50, right: 10, top: 8, bottom: 22 };
 
-/// Axes on two canvases, one for what stays and one for what moves.
+/// Axes on two canvases, one for fixed parts and one for moving ones.
 class Axes {
   constructor(host, description) {
     this.host = host;
@@ -15,7 +15,7 @@ class Axes {
     this.y = { low: 0, high: 1 };
   }
 
-  /// Whether the host has another size than what was drawn.
+  /// Whether the size of the host has changed since it was drawn.
   get isStale() {
     return this.width !== this.host.clientWidth || this.height !== this.host.clientHeight;
   }
@@ -63,7 +63,7 @@ class Axes {
     return this.x.low + ((pixel - left) / (this.width - left - right)) * (this.x.high - this.x.low);
   }
 
-  /// So many numbers have room below.
+  /// How many numbers fit below the plot.
   get mostTicks() {
     return Math.max(2, (this.width - plotMargin.left - plotMargin.right) / 48);
   }
@@ -120,8 +120,7 @@ function wrap(angle) {
   return angle - 2 * Math.PI * Math.round(angle / (2 * Math.PI));
 }
 
-/// Ticks of an axis of ordinary numbers, about `count`, and not fewer than `least` if it can be; angles that are wrapped have
-/// theirs in parts of π.
+/// Ticks of a linear axis, about `count`, and if possible not fewer than `least`; wrapped angles have ticks in parts of π.
 function linearTicks(axis, count, wrapped, least = 0) {
   if (wrapped) {
     return [[-1, "−π"], [-0.5, "−π/2"], [0, "0"], [0.5, "π/2"], [1, "π"]].map(([k, text]) => ({ at: k * Math.PI, text }));
@@ -129,15 +128,15 @@ function linearTicks(axis, count, wrapped, least = 0) {
   return niceTicks(axis.low, axis.high, count, least).map((at) => ({ at, text: readable(at, 6) }));
 }
 
-/// Powers of ten between two of them, no more than `most` if they are given whole.
+/// Ticks at powers of ten between two exponents, at most about `most`.
 const powerStep = (low, high, most) => Math.max(1, Math.ceil((high - low) / most));
 function powerTicks(low, high, most) {
   const step = powerStep(low, high, most);
   return Array.from({ length: Math.floor((high - low) / step) + 1 }, (_, k) => ({ at: low + k * step, text: powerOfTen(low + k * step) }));
 }
 
-/// Least and largest finite number of several arrays, and some room; apart even where all are one. What changes by less than
-/// rounding does, of numbers of a `scale`, rests.
+/// Least and largest finite number of several arrays, with some room, also if all are equal. A range that is smaller than
+/// rounding of numbers of size `scale` counts as constant.
 function rangeOf(arrays, change = (x) => x, scale = 0) {
   let [low, high] = [Infinity, -Infinity];
   for (const numbers of arrays) {
@@ -169,7 +168,7 @@ function panel(title, options = [], kind = "") {
   return { section, heading, plot, keys };
 }
 
-/// Whose colours are whose: [colour, words] of each curve, and what stands without one.
+/// A key to curves: [colour, words] of each, and further words without a colour.
 function nameCurves(keys, curves, ...words) {
   const chips = curves.map(([colour, name]) => {
     const mark = element("i");
@@ -179,7 +178,7 @@ function nameCurves(keys, curves, ...words) {
   keys.replaceChildren(...chips, ...words);
 }
 
-/// Curves over time. A curve is {run, numbers, colour(), alpha}, of linear ones {scale} too; `kind` is "linear", "wrapped" or "log".
+/// Curves over time. A curve is {run, numbers, colour(), alpha}, and {scale} if linear; `kind` is "linear", "wrapped" or "log".
 class TimePlot {
   constructor(host, description, player) {
     this.axes = new Axes(host, description);
@@ -228,7 +227,7 @@ class TimePlot {
     return linearTicks(axes.y, axes.height / 28, wrapped, 3);
   }
 
-  // Zeros, where there are any, are drawn at the bottom, a tick below the least.
+  // Zeros are drawn at the bottom, a tick below the least positive number.
   #logAxis() {
     const arrays = this.curves.map((curve) => curve.numbers);
     const { low, high } = rangeOf(arrays, (x) => (x > 0 ? Math.log10(x) : NaN));
@@ -259,7 +258,7 @@ class TimePlot {
     drawCurve(pen, axes, rows, (row) => curve.run.t[row], (row) => this.#height(curve.numbers[row]), { wrapped: this.kind === "wrapped" ? 1 : -1, isOverTime: true });
   }
 
-  // A point for each number, so that zeros among them tear no comb into the curve; lines where neighbours are near.
+  // Draws a point for each number, and lines only between near neighbours: otherwise zeros would make a comb of the curve.
   #drawLog(pen, curve) {
     const { axes } = this;
     const { t } = curve.run;

@@ -1,7 +1,7 @@
 // What carts, springs and pivots look like on a canvas: here and in the laboratory. Bobs are drawn in plane.js and
 // space.js.
 
-/// Lengths in the size of a cart, or parts of a spring; films have the same (plotting/pendula_plot/shapes.py).
+/// Lengths relative to the size of a cart, or to a spring; films have the same (plotting/pendula_plot/shapes.py).
 const proportions = {
   "springTurns": 10, "springEnd": 0.1,
   "pulley": 0.6, "weightWide": 0.8, "weightHigh": 1.1, "floorWide": 14,
@@ -11,7 +11,7 @@ const proportions = {
 /// Zigzags of a spring, however long it is.
 const { springTurns } = proportions;
 
-/// A line along which a cart runs has no direction: the angle to draw it at, so that its upper side is up.
+/// The angle at which to draw a cart on a rail along (dx, dy) or its opposite, so that its upper side is up.
 function uprightAngle(dx, dy) {
   const angle = Math.atan2(dy, dx);
   if (angle > Math.PI / 2 + 1e-9) return angle - Math.PI;

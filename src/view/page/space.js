@@ -24,17 +24,17 @@ class Space {
     this.#drawFloor();
     figures.forEach((figure, k) => this.#add(figure, isFew || k === figures.length - 1));
     if (holdsOrigin(stage)) this.#addPost();
-    this.items.sort((a, b) => b.faint - a.faint || a.depth - b.depth); // what is solid is seen among many copies
+    this.items.sort((a, b) => b.faint - a.faint || a.depth - b.depth); // solid items are drawn over faint copies
     for (const { draw } of this.items) draw();
   }
 
-  // How much of what lies on the floor is lost in what is behind it.
+  // How far a line on the floor fades with distance, 0 to 1.
   #haze(depth) {
     const part = clamp((-depth / this.stage.radius - 0.8) / 3.2, 0, 1);
     return part * part * (3 - 2 * part);
   }
 
-  // Pieces of lines, and how near the rim each is.
+  // Pieces of the floor's grid lines, and how near to the rim each is.
   #gridLines() {
     const size = this.floorSize;
     const [first, second] = niceTicks(0, size, 7);
@@ -52,7 +52,7 @@ class Space {
     return { places, rims };
   }
 
-  // It fades with its depth, of which its height on the screen tells; from below it is not seen.
+  // The floor fades with depth, which follows from the height on the screen. It is not drawn when seen from below.
   #drawFloor() {
     const { pen, stage, floorSize } = this;
     const { middle: [x0, y0], floor, view } = stage;
@@ -95,7 +95,7 @@ class Space {
     this.items.push({ depth, draw, faint: this.faint });
   }
 
-  // Where the shadow of a place falls.
+  // The place on the floor where the shadow of a place falls.
   #onFloor([x, y, z]) {
     const high = (z - this.stage.floor) / sun[2];
     return [x - high * sun[0], y - high * sun[1], this.stage.floor];
@@ -119,7 +119,7 @@ class Space {
     for (const each of traces) this.#addTrace(each, faint, radii);
   }
 
-  // From where each rod comes out of a ball to where it goes into another, if it does.
+  // The visible part of each rod: from the surface of one bob to that of the other, if there is one.
   #rodsOf(places, radii) {
     const rods = [];
     for (const { on, i } of this.stage.rods) {
@@ -132,7 +132,7 @@ class Space {
     return rods;
   }
 
-  // Of rods bands of their width, of balls discs.
+  // Shadows of rods are bands of their width, those of bobs discs.
   #drawShadows(places, radii, rods) {
     const { pen, stage } = this;
     for (const { from, to } of rods) this.#throw([from, to], this.rodRadius);
@@ -180,7 +180,7 @@ class Space {
     }
   }
 
-  // A round bar in some parts: it may be before one thing and behind another.
+  // A round bar, drawn in parts: it may be in front of one thing and behind another.
   #addBar(from, to, parts, radius, rgb) {
     const along = plus(to, from, -1);
     const shown = this.stage.projected(Array.from({ length: parts + 1 }, (_, k) => plus(from, along, k / parts)).flat());
@@ -204,7 +204,7 @@ class Space {
     return Math.max(radius * this.stage.pixels * (a[2] + b[2]), 1);
   }
 
-  // Where it goes on it is a little longer, so that nothing is seen between.
+  // A part that another one follows is a little longer, so that no gap shows.
   #addPart(a, b, radius, style, goesOn) {
     const { pen } = this;
     const further = goesOn ? 0.6 / (Math.hypot(b[0] - a[0], b[1] - a[1]) || 1) : 0;
@@ -217,7 +217,7 @@ class Space {
     });
   }
 
-  // The shades of a round bar between places, a and b on the screen: across it; of a thin one its middle's.
+  // The shades across a round bar between places, which are a and b on the screen; a thin bar has one shade.
   #shadesOf(from, to, a, b, radius, rgb) {
     const { pen, stage: { axes } } = this;
     const along = unit(plus(to, from, -1));
@@ -247,7 +247,7 @@ class Space {
     const y = across(z, x);
     const { springEnd } = proportions;
     const parts = isSpring ? 12 * springTurns : 8;
-    // Straight to the axis at both ends, half a turn from there.
+    // At both ends the wire goes straight to the axis.
     const places = Array.from({ length: parts + 1 }, (_, k) => {
       const part = clamp((k / parts - springEnd) / (1 - 2 * springEnd), 0, 1);
       const angle = 2 * Math.PI * springTurns * part;
@@ -259,7 +259,7 @@ class Space {
     this.#throw(places, radius);
   }
 
-  // x is the way it runs, z up if it can be.
+  // x is the direction of the rail, z as near to up as possible.
   #addCart(place, rail, size, rgb) {
     const x = rail ?? [1, 0, 0];
     const level = across([0, 0, 1], x);
@@ -273,7 +273,7 @@ class Space {
         this.#addPrism(place, frame, disc, side * size, 0.1 * size, palette.rgb.edge);
       }
       if (!rail) continue;
-      // Rails lie still, about the place next to the origin.
+      // The rail does not move: its middle is the point of its line next to the origin.
       const middle = plus(plus(plus(place, rail, -dotOf(place, rail)), frame[1], side * size), frame[2], -1.06 * size);
       const ends = [-2, 2].map((way) => plus(middle, rail, way * this.stage.reach));
       this.#addBar(...ends, 16, 0.05 * size, palette.rgb.edge);
@@ -301,7 +301,7 @@ class Space {
     });
   }
 
-  // Below the origin, to the floor.
+  // A post from the origin down to the floor.
   #addPost() {
     const { pen, stage } = this;
     this.#addBar([0, 0, 0], [0, 0, stage.floor], 12, 0);
@@ -309,7 +309,7 @@ class Space {
     this.#put(depth, () => drawDisc(pen, x, y, Math.max(this.pivotRadius * stage.pixels * near, 2), palette.css("ink")));
   }
 
-  // Up to where it comes out of its ball; it runs out thin and pale.
+  // The trace ends at the surface of its bob; its old end is thin and pale.
   #addTrace({ way, rgb, isUniform, point = this.stage.count - 1 }, isFaint, radii) {
     const { pen, stage } = this;
     const last = way.length - 3;

@@ -1,9 +1,9 @@
 // The stage: chains or points that move, in the plane or in space, of one motion or of several.
 
-/// From so many balls on, each is one colour in the plane.
+/// With more bobs, each is drawn in one colour in the plane, without shades.
 const manyBalls = 60;
 
-/// Radii of balls: volumes are in proportion to masses, and none is too small to see.
+/// Radii of bobs: volumes are in proportion to masses, but none is too small to see.
 function radiiOf({ space, kinds, masses, reach }) {
   const largest = Math.max(...masses, 0);
   const size = reach * clamp(0.07 / Math.sqrt(kinds.length), 0.005, 0.055);
@@ -20,8 +20,8 @@ function holdsOrigin({ hangs, connections }) {
 }
 
 class Stage extends View {
-  /// What there is to draw. Of each point what it hangs on by a rod (-1: the origin, -2: nothing), its kind, its rail, its mass; of
-  /// `connections` kind and ends; the box [low, high] that all stays in, and the length that others compare with.
+  /// Sets what is drawn. Each point has the point that it hangs on by a rod (-1: the origin, -2: nothing), a kind, a rail and a
+  /// mass; `connections` have kinds and ends; [low, high] is the box of all motions, `reach` the scale of lengths.
   shape(told) {
     Object.assign(this, told, { count: told.kinds.length, radii: radiiOf(told) });
     this.rods = this.hangs.map((on, i) => ({ on, i })).filter(({ on }) => on !== -2);

@@ -27,14 +27,14 @@ class Theatre extends Stage {
     super.zoom(...how);
     this.onChange();
   }
-  /// By keys: turns what can be turned, unless it is to be moved.
+  /// Keys turn the view in space, or move it if `moves`; in the plane they move it.
   steer(x, y, moves) {
     if (this.space === 3 && !moves) this.turn(-12.5 * x, 12.5 * y);
     else this.move(-0.05 * x * this.width, 0.05 * y * this.height);
     this.onChange();
   }
 
-  /// `trace`: the part of the first run's time that traces are long.
+  /// `trace`: length of traces, as a part of the first run's time.
   draw(time, trace) {
     const since = time - trace * (runs[0].end - runs[0].start);
     const figures = runs.map((run, k) => {
@@ -47,7 +47,7 @@ class Theatre extends Stage {
     super.draw(figures.reverse()); // the first one on top
   }
 
-  // Of a traced point, to where it is now.
+  // The way of a traced point since a time, to where it is now.
   #way(k, n, since, time) {
     const { times, places } = this.paths[k][n];
     const at = (when) => lastBy(when, times.length, (sample) => times[sample]);

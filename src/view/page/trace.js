@@ -1,7 +1,7 @@
-// What a point leaves behind it.
+// Traces that points leave behind.
 
-/// A trace in pieces of one brightness each, oldest first: {line, strength, age}; `line` is what View.projected gives of a
-/// piece, `age` runs to 1. A stroke costs much more than a point.
+/// A trace in pieces of one brightness each, oldest first: {line, strength, age}; `line` is a piece as View.projected
+/// returns it, `age` runs to 1. Few pieces, because a stroke costs much more than a point.
 function piecesOf(line, count, isUniform) {
   const last = line.length / 4 - 1;
   const pieces = [];
@@ -14,13 +14,13 @@ function piecesOf(line, count, isUniform) {
   return pieces;
 }
 
-/// Draws a piece; of one that goes to and fro too closely to be seen what it covers.
+/// Draws a piece. Of one that goes to and fro too closely to be seen, it draws the area that the piece covers.
 function drawPiece(pen, { line, strength }, rgb, width) {
   const cover = coverOf(line);
   pen.strokeStyle = rgba(rgb, strength);
   pen.fillStyle = rgba(rgb, 0.4 * strength);
   pen.lineWidth = width;
-  pen.lineCap = "butt"; // pieces let through what is behind them: round ends would be seen twice
+  pen.lineCap = "butt"; // pieces are transparent: round ends would overlap visibly
   pen.beginPath();
   if (cover) for (const [x, y] of cover) pen.lineTo(x, y);
   else for (let k = 0; k < line.length; k += 4) pen.lineTo(line[k], line[k + 1]);

@@ -1,9 +1,9 @@
-// Where the eye is: what a place is on a canvas, and the way back. Places have three numbers, in the plane the second is 0.
+// The view: from places to the canvas, and back. Places have three numbers; in the plane the second is 0.
 
-/// Pixels that a motion in the plane leaves free: for the clock and the buttons, and for the rule.
+/// Pixels that a motion in the plane leaves free: for clock and buttons, and for the scale.
 const inset = { top: 42, bottom: 32 };
 
-/// In the size of what is to be seen: how far the eye is from its middle, that 32° hold it.
+/// Distance of the eye from the middle, in the radius of what is shown, so that 32° hold it.
 const eyeDistance = 1 / Math.sin((16 * Math.PI) / 180);
 
 function clamp(x, low, high) {
@@ -21,7 +21,7 @@ class View {
     Object.assign(this.view, { zoom: 1, x: 0, y: 0, azimuth: -1.05, elevation: 0.24 });
   }
 
-  /// The box that is to be seen. In space a floor lies a little below it, and a sphere is about both.
+  /// Sets the box that is shown. In space a floor lies a little below the box, and `radius` is that of a sphere around both.
   fit({ space, low, high, reach }) {
     Object.assign(this, { space, reach });
     this.middle = low.map((x, axis) => (x + high[axis]) / 2);
@@ -40,19 +40,19 @@ class View {
     Object.assign(this, { width, height, fine: this.canvas.width / Math.max(width, 1) });
   }
 
-  /// Pixels of CSS to a metre where it is as far as the middle.
+  /// CSS pixels of a metre at the distance of the middle.
   get scale() {
     const { width, height, view } = this;
     if (this.space === 3) return ((0.48 * Math.max(Math.min(width, height), 60)) / this.radius) * view.zoom;
     return Math.min(width / this.home[0], Math.max(height - inset.top - inset.bottom, 1) / this.home[1]) * view.zoom;
   }
 
-  /// Where the middle is, from the top, unless it was moved.
+  /// The height of the middle from the top, unless the view was moved.
   get centre() {
     return (this.height + (this.space === 2 ? inset.top - inset.bottom : 0)) / 2;
   }
 
-  /// Takes the view as it is now.
+  /// Computes the projection for the present view.
   aim() {
     const { azimuth, elevation } = this.view;
     const [sa, ca, se, ce] = [Math.sin(azimuth), Math.cos(azimuth), Math.sin(elevation), Math.cos(elevation)];
@@ -71,7 +71,7 @@ class View {
     return this.projected([x, y, z]);
   }
 
-  /// The same of all places that stand one after the other.
+  /// The same for consecutive places.
   projected(places) {
     const { far, left, top, pixels, middle } = this;
     const [right, up, eye] = this.axes;
@@ -97,7 +97,7 @@ class View {
     return this.middle.map((c, axis) => c + a * right[axis] + b * up[axis] + (this.space === 2 ? 0 : depth * eye[axis]));
   }
 
-  /// About a pixel.
+  /// Zooms about a pixel.
   zoom(factor, pixelX = this.width / 2, pixelY = this.centre) {
     this.aim();
     const { view, pixels } = this;
@@ -107,7 +107,7 @@ class View {
     view.y -= (pixelY - this.centre) * change;
     this.aim();
   }
-  /// By pixels.
+  /// Turns the view, by pixels.
   turn(dx, dy) {
     this.view.azimuth -= dx * 0.008;
     this.view.elevation = clamp(this.view.elevation + dy * 0.008, -1.5, 1.5);
