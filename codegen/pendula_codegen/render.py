@@ -55,7 +55,10 @@ class Header:
 KINDS = {
     "backends/bytecode.py": {"program"},
     "backends/c.py": {"program"},
-    **{f"backends/{name}.py": {"program"} for name in ("llvm", "llvm_functions", "llvm_loops", "llvm_text")},
+    **{
+        f"backends/{name}.py": {"program"}
+        for name in ("llvm", "llvm_functions", "llvm_loops", "llvm_series", "llvm_steps", "llvm_text")
+    },
     "backends/c99.py": {"export"},
     "backends/c_series.py": {"program"},
     "backends/cpp_series.py": {"kernel", "model"},
