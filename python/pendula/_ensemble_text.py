@@ -10,7 +10,7 @@ import numpy as np
 
 from . import _toml
 from ._core import InputError
-from ._runs import columns_of, numbers, require_known
+from ._runs import columns_of, has_texts, numbers, require_known
 from ._systems import Chain, System
 
 if TYPE_CHECKING:
@@ -95,7 +95,7 @@ class Design:
         links = columns_of(name, self._columns)
         if not links:
             require_known("start", [name], self._columns)
-        if isinstance(given, tuple) or _has_texts(given):
+        if isinstance(given, tuple) or has_texts(given):
             if len(given) != len(links):  # type: ignore[arg-type]
                 raise InputError(f"start: expected {len(links)} of {name}, got {len(given)}")  # type: ignore[arg-type]
             return list(zip(links, given, strict=True))  # type: ignore[call-overload]
@@ -168,12 +168,6 @@ def ensemble_text(
         "keep": None if keep is None else list(keep),
     }
     return _toml.document({**tables, "ensemble": ensemble})
-
-
-def _has_texts(given: object) -> bool:
-    return (
-        isinstance(given, Sequence) and not isinstance(given, str) and any(isinstance(x, str) for x in given)
-    )
 
 
 def _values(name: str, given: object) -> NDArray[np.float64]:

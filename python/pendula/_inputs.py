@@ -8,7 +8,7 @@ from os import PathLike
 from pathlib import Path
 
 from ._core import InputError
-from ._runs import mapping, numbers, require_known
+from ._runs import has_texts, mapping, numbers, require_known
 
 Signals = dict[str, dict[str, object]]
 MOTIONS = '; a motion of the model is no input: drives=[{"input": "NAME", "value": "sin(t)"}] moves one'
@@ -48,6 +48,9 @@ def _signal(name: str, where: str, given: Mapping[str, object]) -> dict[str, obj
         table["file"] = str(Path(str(given["file"])).resolve())
     for key in ("times", "values"):
         if key not in given:
+            continue
+        if has_texts(given[key]):
+            table[key] = list(given[key])  # type: ignore[call-overload]  # with units
             continue
         array = numbers(f"{where}.{key}", given[key])
         if array.ndim != 1:

@@ -244,6 +244,11 @@ def numbers(name: str, given: object) -> NDArray[np.float64]:
     return array.astype(float)
 
 
+def has_texts(given: object) -> bool:
+    """Whether texts are among the elements: numbers with units."""
+    return isinstance(given, (list, tuple)) and any(isinstance(one, str) for one in given)
+
+
 def in_order(columns: list[str], state: Sequence[int]) -> list[int]:
     """Indices of the time, of coordinates and rates in the order of states, and of the other columns of a row."""
     first = dict.fromkeys([0, *state])

@@ -85,6 +85,8 @@ def test_numbers_may_have_units() -> None:
     assert cart == pendula.Model("cart_chain", links=1, inputs={"push": 100 * 1e-3})
     run = CART.simulate("10 ms", START, inputs={"push": "100 mN"})
     assert run.t[-1] == 10 * 1e-3 and run["push"][-1] == 100 * 1e-3
+    over_time = CART.simulate("10 ms", START, inputs={"push": (["0 ms", "20 ms"], ["0 N", "200 mN"])})
+    assert over_time["push"][-1] == pytest.approx(0.1, rel=1e-15)
 
 
 def test_a_motion_is_told_to_be_no_input(tmp_path: Path) -> None:
