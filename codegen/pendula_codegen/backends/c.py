@@ -10,7 +10,7 @@ from pendula_codegen.linear_solve import UNROLLED
 from pendula_codegen.table import CONDITIONS, KernelTable, TableFunction
 from pendula_codegen.tape import Row, Step, Tape, Value
 
-INTERFACE = 15  # system_interface of pendula/system/system_table.hpp
+INTERFACE = 16  # system_interface of pendula/system/system_table.hpp
 # Functions of one argument that are taken of numbers one by one.
 CALLS = {"acos", "asin", "atan", "cbrt", "cosh", "sinh", "sqrt", "tan", "tanh"}
 # What of so many states nothing asks for within steps: it is compiled for eight, and others go that way.
