@@ -21,6 +21,7 @@ constexpr double short_run = 100;  // steps
 /// Why a subject does not go by Taylor series: it has none, or Gauss steps take less time. Empty if it does.
 std::string against_series(const Subject& subject, double tolerance) {
   if (const auto* const system = dynamic_cast<const SystemSubject*>(&subject)) {
+    if (!system->info().constraints.empty()) return "constraints";
     if (system->table().of_1.series_next == nullptr) return "no series in the kernel";
     if (system->info().coordinates.size() > most_coordinates) return "many coordinates";
     if (system->info().depends_on_time) return "time in the equations";
