@@ -25,6 +25,7 @@ from pendula_codegen.export import (
     Request,
     Values,
     render_export,
+    require_free,
     require_size,
 )
 from pendula_codegen.feedback import SampledLaw, close_loops, sampled_laws, sampled_laws_of_chain
@@ -260,6 +261,7 @@ def _exported_chain(options: argparse.Namespace) -> Mapping[str, str | bytes]:
 
 def _exported_model(options: argparse.Namespace) -> Mapping[str, str | bytes]:
     model = _fed_model(options)
+    require_free(model.constraints)
     wanted = _request(options, sampled_laws(model, options.sampled))
     command = f"--model {Path(options.model).name}{links_argument(model)} {_export_words(options)} --output ."
     kernel, file = ModelKernel(model), Path(model.file)

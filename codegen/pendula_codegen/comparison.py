@@ -74,7 +74,11 @@ class _Symbols:
 def points(model: Model, start: Start, seed: int) -> list[Numbers]:
     """Points at which the Lagrangian and the forces have values."""
     draw, symbols = random.Random(seed), _Symbols(model)
-    said = [model.lagrangian, *(model.force_along(q) for q in symbols.q)]
+    said = [
+        model.lagrangian,
+        *(model.force_along(q) for q in symbols.q),
+        *(constraint.value for constraint in model.constraints),
+    ]
     found: list[Numbers] = []
 
     def keep(numbers: Numbers) -> bool:

@@ -56,6 +56,10 @@ def describe(file: Path, links: int | None = None) -> dict[str, object]:
             {"name": m.symbol.name, "unit": m.unit, "default": m.default, "remark": remark(m.symbol.name)}
             for m in model.motions
         ],
+        "constraints": [
+            {"name": each.name, "unit": each.unit, "remark": remark(each.name)} for each in model.constraints
+        ],
+        "degrees_of_freedom": len(model.coordinates) - len(model.constraints),
         "switches": [{"value": switch.text, "remark": ""} for switch in model.switches],
         "points": [
             {

@@ -38,7 +38,8 @@ class Argument:
 class Output:
     """One output argument: its type, its entries, and what documents it.
 
-    type    scalar, vector, matrix, points, arguments, switches, link_vector or link_matrix
+    type    scalar, vector, matrix, points, arguments, switches, constraints (a number each), constraint_slopes
+            (a row each), link_vector or link_matrix
     lower   only the lower triangle is written
     """
 
@@ -54,7 +55,7 @@ class Output:
         if not isinstance(self.value, Matrix):
             return [(Place(self.name), self.value)]
         rows, columns = self.value.shape
-        if columns == 1 and self.type in ("vector", "link_vector", "arguments", "switches"):
+        if columns == 1 and self.type in ("vector", "link_vector", "arguments", "switches", "constraints"):
             return [(Place(self.name, index=(i,)), self.value[i, 0]) for i in range(rows)]
         return [
             (Place(self.name, index=(i, j)), self.value[i, j])

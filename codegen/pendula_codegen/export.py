@@ -19,7 +19,7 @@ from pendula_codegen.errors import GenerationError
 from pendula_codegen.feedback import SampledLaw
 from pendula_codegen.forward import slopes
 from pendula_codegen.linear_solve import UNROLLED
-from pendula_codegen.model import CPP_KEYWORDS
+from pendula_codegen.model import CPP_KEYWORDS, Constraint
 from pendula_codegen.places import Place
 from pendula_codegen.program import shortest_program
 from pendula_codegen.recording import Recorder
@@ -311,6 +311,15 @@ def _require_smooth(switches: Sequence[str]) -> None:
         raise GenerationError(
             "export: casadi: expected a smooth model, got one with functions of several pieces (Piecewise, Abs, "
             "sign, ...): steps would have to end where the pieces meet. C and FMUs have functions for that"
+        )
+
+
+def require_free(constraints: Sequence[Constraint]) -> None:
+    """Raises GenerationError where there are some."""
+    if constraints:
+        names = ", ".join(each.name for each in constraints)
+        raise GenerationError(
+            f"export: expected a model without constraints, got one with {names}: what is exported cannot keep them yet"
         )
 
 

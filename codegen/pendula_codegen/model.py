@@ -113,6 +113,16 @@ class Point:
 
 
 @dataclass(frozen=True)
+class Constraint:
+    """g(q, t) = 0, and the line of the model that said it."""
+
+    name: str
+    unit: str
+    value: Expr
+    where: str
+
+
+@dataclass(frozen=True)
 class Connection:
     """Something drawn between two points, by number, -1 for the origin. kind: "spring", "thread" or "pulleys"."""
 
@@ -139,6 +149,7 @@ class Model:
     parameters: list[Parameter] = field(default_factory=list)
     inputs: list[Input] = field(default_factory=list)
     motions: list[Motion] = field(default_factory=list)
+    constraints: list[Constraint] = field(default_factory=list)
     points: list[Point] = field(default_factory=list)
     connections: list[Connection] = field(default_factory=list)
     _forces: list[tuple[Symbol, _Said]] = field(default_factory=list)
@@ -267,6 +278,28 @@ class Model:
             self._fail(f"force: expected a coordinate of the model first, got {coordinate}")
         self._forces.append((coordinate, self._said(value, "force")))
 
+    def constraint(self, name: str, value: Expr, unit: str) -> None:
+        """What is 0 at all times: an expression of coordinates, motions, parameters and time. Forces keep it so.
+
+        The force is the column force_<name>, J over the unit of the expression.
+        """
+        self._declare(name, "a constraint")
+        self._declare(f"force_{name}", f"the force of {name}")
+        value = self._expression(value, f"constraint {name}")
+        rates = [rate for rate in self._rates() if value.has(rate)]
+        if rates:
+            self._fail(
+                f"constraint {name} holds '{rates[0]}', a rate: constraints of rates are not there yet; "
+                "expected coordinates, motions, parameters and time"
+            )
+        motions = (m.symbol for m in self.motions)
+        self._check(value, f"constraint {name}", (*self._positions(), *motions, self.time))
+        if self._switches.held_by(value):
+            self._fail(
+                f"constraint {name}: expected one smooth function, got one of several pieces: a bend in it is a blow"
+            )
+        self.constraints.append(Constraint(name, self._text(unit, "a unit"), value, self._line()))
+
     def point(self, name: str, components: Sequence[Expr], *, kind: str = "bob") -> Point:
         """A point for files and pictures: 2 or 3 components, m.
 
@@ -357,6 +390,7 @@ class Model:
         self._switches.substitute(changes)
         self._lagrangian, self._dissipation = moved(self._lagrangian), moved(self._dissipation)
         self._forces[:] = [(along, moved(said)) for along, said in self._forces]
+        self.constraints[:] = [replace(each, value=each.value.xreplace(changes)) for each in self.constraints]
         self.points[:] = [
             replace(point, components=tuple(each.xreplace(changes) for each in point.components))
             for point in self.points
@@ -408,11 +442,17 @@ class Model:
             time=self.time,
         )
         self._check_kinetic(system, self._lagrangian.where)
+        self._check_constraints()
         return system
 
     def held_expressions(self) -> list[Expr]:
         """What moves it."""
-        return [self.system.lagrangian, *self.system.forces, *(switch.value for switch in self.switches)]
+        return [
+            self.system.lagrangian,
+            *self.system.forces,
+            *(switch.value for switch in self.switches),
+            *(constraint.value for constraint in self.constraints),
+        ]
 
     def force_along(self, q: Symbol) -> Expr:
         """Generalised force along a coordinate that L does not give, as the file says it."""
@@ -462,6 +502,23 @@ class Model:
                 )
         if _is_singular(mass):
             raise GenerationError(f"{where}: lagrangian: its mass matrix is singular everywhere")
+
+    def _check_constraints(self) -> None:
+        """Refuses those that coordinates cannot meet, or that say again what others say."""
+        slopes = jacobian([each.value for each in self.constraints], [c.symbol for c in self.coordinates])
+        for k, (constraint, row) in enumerate(zip(self.constraints, slopes, strict=True)):
+            said = f"{constraint.where}: constraint {constraint.name}"
+            if constraint.value.is_number and constraint.value != 0:
+                raise GenerationError(
+                    f"{said}: expected 0 somewhere, got {constraint.value}, which is never 0"
+                )
+            if _is_singular(_products([row])):
+                raise GenerationError(f"{said}: expected one that some coordinate changes, got none")
+            if _is_singular(_products(slopes[: k + 1])):
+                others = ", ".join(each.name for each in self.constraints[:k])
+                raise GenerationError(
+                    f"{said}: expected one that others do not contain, got what {others} fix already"
+                )
 
     # --- names, lines and messages
 
@@ -567,8 +624,13 @@ def _rate_symbol(q: Symbol) -> Symbol:
     return Symbol(rate_name(q.name), real=True)
 
 
+def _products(rows: list[list[Expr]]) -> list[list[Expr]]:
+    """Those of rows with one another: singular where the rows depend on one another."""
+    return [[Add(*(x * y for x, y in zip(one, other, strict=True))) for other in rows] for one in rows]
+
+
 def _is_singular(mass: list[list[Expr]]) -> bool:
-    """Whether a matrix is singular wherever one looks: at a few places, none of which is special."""
+    """Whether a symmetric matrix is singular wherever one looks: at a few places, none of which is special."""
     symbols = sorted({s for row in mass for entry in row for s in entry.free_symbols}, key=lambda s: s.name)
     evaluate = lambdify(symbols, mass, "mpmath")
     draw = random.Random(1)

@@ -38,16 +38,7 @@ class ModelKernel(SystemKernel):
     @cached_property
     def points(self) -> tuple[Matrix | None, Matrix | None]:
         components = [component for point in self.model.points for component in point.components]
-        if not components:
-            return None, None
-        system = self.system
-        slopes = jacobian(components, system.coordinates)
-        rates = [
-            sum(slope * v for slope, v in zip(row, system.velocities, strict=True))
-            + time_slope(system, component)
-            for component, row in zip(components, slopes, strict=True)
-        ]
-        return Matrix(components), Matrix(rates)
+        return (Matrix(components), Matrix(self._changes(components))) if components else (None, None)
 
     def functions(self) -> list[EntryPoint]:
         read = (self.parameters, Q, V, self.inputs)
@@ -62,7 +53,52 @@ class ModelKernel(SystemKernel):
             found = Output("g", "switches", values, f"switching functions, ({values.rows})")
             title = "Switching functions, in whose zeros above_k and below_k change"
             functions.append(EntryPoint("switches", title, read, (found,)))
-        return functions
+        return [*functions, *self.constraints()]
+
+    def constraints(self) -> list[EntryPoint]:
+        """Of models that have some."""
+        if not self.model.constraints:
+            return []
+        system, given = self.system, self.model.constraints
+        values = [constraint.value for constraint in given]
+        slopes = self.jacobian(values, system.coordinates)
+        rates = self._changes(values)
+        read, count = (self.parameters, Q, V), len(given)
+
+        def numbers(name: str, value: list[Expr], meaning: str) -> Output:
+            return Output(name, "constraints", Matrix(value), f"{meaning}, ({count})")
+
+        matrix = Output(
+            "g_D_q", "constraint_slopes", slopes, f"∂g_row/∂q_column, ({count} x {len(system.coordinates)})"
+        )
+        return [
+            EntryPoint(
+                "constraints",
+                "Constraints  g(q, t) = 0,  which forces (∂g/∂q)ᵀ λ keep",
+                read[:2],
+                (numbers("g", values, "constraints"), matrix),
+            ),
+            EntryPoint(
+                "constraint_rates",
+                "Rates of the constraints  dg/dt = (∂g/∂q) v + ∂g/∂t,  and d²g/dt² where nothing accelerates",
+                read,
+                (
+                    numbers("g_dot", rates, "rates of the constraints"),
+                    numbers("g_ddot", self._changes(rates), "second rates without accelerations"),
+                ),
+            ),
+        ]
+
+    def _changes(self, values: list[Expr]) -> list[Expr]:
+        """Rates of functions of coordinates and time; of such that hold rates, without accelerations."""
+        system = self.system
+        return [
+            Add(
+                *(slope * v for slope, v in zip(row, system.velocities, strict=True)),
+                time_slope(system, value),
+            )
+            for value, row in zip(values, jacobian(values, system.coordinates), strict=True)
+        ]
 
     @cached_property
     def call_arguments(self) -> list[tuple[Expr, bool]]:

@@ -12,6 +12,7 @@ from pendula_codegen.places import Place
 from pendula_codegen.program import Program
 from pendula_codegen.tape import Row, Solved, Tape, Value
 
+_BY_ROWS = ("matrix", "constraint_slopes")
 Strides = Mapping[str, tuple[int, int]]  # strides of arrays with two indices
 
 
@@ -36,7 +37,7 @@ class Recorder:
         solve = function.solve
         solved = None if solve is None else Solved(solve.solution.name, len(solve.unknowns))
         strides = {
-            output.name: (output.value.cols, 1) if output.type == "matrix" else (1, output.value.rows)
+            output.name: (output.value.cols, 1) if output.type in _BY_ROWS else (1, output.value.rows)
             for output in function.written
             if isinstance(output.value, Matrix)
         }

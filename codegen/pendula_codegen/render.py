@@ -24,7 +24,7 @@ from pendula_codegen.errors import GenerationError
 from pendula_codegen.linear_solve import UNROLLED, solve_lines
 from pendula_codegen.link import LinkKernel
 from pendula_codegen.links import find_link
-from pendula_codegen.model import Connection, Coordinate, Input, Model, Parameter
+from pendula_codegen.model import Connection, Constraint, Coordinate, Input, Model, Parameter
 from pendula_codegen.model_kernel import ModelKernel
 from pendula_codegen.system_info import depends_on_time, has_constant_masses, is_periodic
 from pendula_codegen.tableau import DIGITS, MATRICES, MAX_STAGES, RADAU_STAGES, VECTORS, gauss, radau
@@ -176,6 +176,7 @@ class Words:
     switches: list[str] = field(default_factory=list)
     kinds: list[str] = field(default_factory=list)
     connections: list[Connection] = field(default_factory=list)
+    constraints: list[Constraint] = field(default_factory=list)
     held: list[Expr] = field(default_factory=list)
     alias: str = ""
     own: list[str] = field(default_factory=list)
@@ -279,6 +280,7 @@ def render_model(model: Model, source: str, alias: str = "") -> Header:
             "Inputs": cpp.matrix(inputs, 1),
             **({"Arguments": cpp.matrix(len(bases), 1)} if bases else {}),
             **({"Switches": cpp.matrix(len(switches), 1)} if switches else {}),
+            **(_constraint_types(len(model.constraints), len(names)) if model.constraints else {}),
         },
         fields=[cpp.parameter_field(parameter) for parameter in ordered],
         holds_time=holds_time,
@@ -287,11 +289,16 @@ def render_model(model: Model, source: str, alias: str = "") -> Header:
         switches=switches,
         kinds=[point.kind for point in model.points],
         connections=model.connections,
+        constraints=model.constraints,
         held=model.held_expressions(),
         alias=alias,
         own=[parameter.name for parameter in ordered] + [alias] * bool(alias),
     )
     return _render(kernel, words)
+
+
+def _constraint_types(count: int, coordinates: int) -> dict[str, str]:
+    return {"Constraints": cpp.matrix(count, 1), "ConstraintSlopes": cpp.matrix(count, coordinates)}
 
 
 def _about_switches(switches: Sequence[str]) -> list[str]:
@@ -326,6 +333,7 @@ def _render(kernel: SystemKernel, words: Words) -> Header:
                 words.switches,
                 words.kinds,
                 words.connections,
+                words.constraints,
             ),
             *(series_constants(tapes) if tapes is not None else []),
         ],

@@ -34,6 +34,7 @@ def info_lines(kernel: ModelKernel, tapes: SeriesTapes) -> list[str]:
     rows += [("connection", each.kind, *each.ends) for each in model.connections]
     rows += [("argument", is_base) for _, is_base in kernel.call_arguments]
     rows += [("switch", switch.text) for switch in model.switches]
+    rows += [("constraint", each.name, each.unit) for each in model.constraints]
     series = tapes.series
     rows.append(("series", series.has_momenta, len(series.sums), len(series.operands), tapes.kept))
     rows += [("sum", *pair) for pair in series.places]

@@ -29,6 +29,8 @@ OF_MANY = (
     "acceleration_along",
     "momentum_form_along",
     "call_arguments",
+    "constraints",
+    "constraint_rates",
     "series_start_along",
     "series_next_along",
 )

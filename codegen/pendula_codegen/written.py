@@ -42,6 +42,10 @@ class Written:
     velocities: list[Expr]
     momenta_at_rest: list[Expr]
     residual_at_rest: list[Expr]
+    constraints: list[Expr]
+    constraints_q: list[Expr]
+    constraint_rates: list[Expr]
+    constraint_second_rates: list[Expr]
 
 
 def written(model: Model) -> Written:
@@ -50,10 +54,15 @@ def written(model: Model) -> Written:
     L, Q = model.lagrangian, [model.force_along(x) for x in q]
     p = [L.diff(rate) for rate in v]
     f = [L.diff(x) + force for x, force in zip(q, Q, strict=True)]
-    slope = [
-        Add(momentum.diff(t), *(momentum.diff(x) * rate for x, rate in zip(q, v, strict=True)))
-        for momentum in p
-    ]
+
+    def changes(values: list[Expr]) -> list[Expr]:
+        """Rates, without accelerations."""
+        return [
+            Add(value.diff(t), *(value.diff(x) * rate for x, rate in zip(q, v, strict=True)))
+            for value in values
+        ]
+
+    slope = changes(p)
     E = [
         Add(
             change,
@@ -63,6 +72,8 @@ def written(model: Model) -> Written:
         for momentum, change, force in zip(p, slope, f, strict=True)
     ]
     points = [component for point in model.points for component in point.components]
+    constraints = [constraint.value for constraint in model.constraints]
+
     still = {rate: Integer(0) for rate in v}
     return Written(
         kinetic_energy=[
@@ -81,12 +92,13 @@ def written(model: Model) -> Written:
         residual_v=_jacobian(E, v),
         power=[Add(*(force * rate for force, rate in zip(Q, v, strict=True)), -L.diff(t))],
         positions=points,
-        velocities=[
-            Add(component.diff(t), *(component.diff(x) * rate for x, rate in zip(q, v, strict=True)))
-            for component in points
-        ],
+        velocities=changes(points),
         momenta_at_rest=[momentum.xreplace(still) for momentum in p],
         residual_at_rest=[Add(change, -force) for change, force in zip(slope, f, strict=True)],
+        constraints=constraints,
+        constraints_q=_jacobian(constraints, q),
+        constraint_rates=changes(constraints),
+        constraint_second_rates=changes(changes(constraints)),
     )
 
 

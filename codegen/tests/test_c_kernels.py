@@ -51,6 +51,8 @@ def define(model, links):
     model.force(theta, w + u * y)
     model.point("p", (x, y))
     model.point("r", (x + sin(theta), y, cos(theta) * t))
+    model.constraint("tied", x**2 + a * sqrt(2 + y**2) - sin(theta + t), "m^2")
+    model.constraint("turned", theta * t - b * y, "rad")
 """
 # Functions of several pieces, one in another, and one whose pieces have no values elsewhere.
 PIECES = """
@@ -200,6 +202,13 @@ class Truth:
                 return self.of(base, at) | {f"d_{array}": rows for array, rows in slope.items()}
             case "call_arguments":
                 return {"found": self._values("arguments", self._arguments, at)}
+            case "constraints":
+                return {"g": said("constraints", at), "g_D_q": said("constraints_q", at)}
+            case "constraint_rates":
+                return {
+                    "g_dot": said("constraint_rates", at),
+                    "g_ddot": said("constraint_second_rates", at),
+                }
             case "switches":
                 return {"g": self._values("switches", [s.value for s in self.model.switches], at)}
             case "positions":

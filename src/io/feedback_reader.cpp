@@ -26,7 +26,8 @@ constexpr const char* nameless = "";
 std::vector<std::string> names_for(const Subject& subject, bool without_energy) {
   std::vector<std::string> names = subject.columns();
   for (const Quantity& quantity : subject.quantities()) {
-    const bool is_left_out = quantity.role == Role::input || (without_energy && quantity.role == Role::energy);
+    const bool is_energy = quantity.role == Role::energy || quantity.role == Role::force;
+    const bool is_left_out = quantity.role == Role::input || (without_energy && is_energy);
     for (std::size_t k = 0; is_left_out && k < quantity.size(); ++k) names[quantity.column(k)] = nameless;
   }
   return names;

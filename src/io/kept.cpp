@@ -76,8 +76,7 @@ void KeptQuantities::add(const std::string& what, const std::string& place, cons
 void KeptQuantities::add_last(const std::vector<Quantity>& quantities, bool points) {
   const std::vector<std::string> names = columns_of(quantities);
   for (const Quantity& quantity : quantities) {
-    const bool is_place = quantity.role == Role::point || quantity.role == Role::energy;
-    if (is_place != points || quantity.role == Role::input || quantity.role == Role::own) continue;
+    if (quantity.is_observed() != points || quantity.role == Role::input || quantity.role == Role::own) continue;
     for (std::size_t k = 0; k < quantity.size(); ++k) {
       const std::size_t column = quantity.column(k);
       columns_.push_back(

@@ -27,8 +27,7 @@ class RowFunction : public Formula {
       : subject_(std::move(subject)), expression_(std::move(expression)), numbers_(columns().size()) {
     std::size_t of_motion = std::numeric_limits<std::size_t>::max();  // first column of points or energy
     for (const Quantity& quantity : subject_->quantities()) {
-      const bool is_observed = quantity.role == Role::point || quantity.role == Role::energy;
-      if (is_observed) of_motion = std::min(of_motion, quantity.first);
+      if (quantity.is_observed()) of_motion = std::min(of_motion, quantity.first);
     }
     const auto is_observed = [&](std::size_t column) { return column >= of_motion; };
     observes_ = std::ranges::any_of(columns(), is_observed);

@@ -88,7 +88,8 @@ std::string against_slopes(const Subject& subject, const Expression& expression,
   for (const Quantity& quantity : subject.quantities()) {
     for (const std::size_t column : expression.columns()) {
       const bool is_fed = std::ranges::find(fed, column) != fed.end();
-      if (!quantity.holds(column) || (quantity.role != Role::energy && !is_fed)) continue;
+      const bool has_none = is_fed || quantity.role == Role::energy || quantity.role == Role::force;
+      if (!quantity.holds(column) || !has_none) continue;
       return "expected an expression in t, coordinates, rates, points and inputs without feedback, got " +
              names[column];
     }

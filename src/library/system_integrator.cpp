@@ -3,6 +3,8 @@
 #include <pendula/gauss/gauss_integrator.hpp>
 #include <pendula/gauss/lagrangian_solver.hpp>
 #include <pendula/gauss/velocity_form.hpp>
+#include <pendula/system/no_constraints.hpp>
+#include <string>
 
 #include "library/explicit_methods.hpp"
 
@@ -26,7 +28,10 @@ std::unique_ptr<PlainIntegrator> make_gauss(const SystemModel& model, const RunO
 
 std::unique_ptr<PlainIntegrator> make_system_integrator(const SystemTable& table, const PlainSystem& plain,
                                                         const RunOptions& options, int parts) {
-  if (is_explicit(options.method)) return make_explicit_system(table, plain, options);
+  if (is_explicit(options.method)) {
+    require_no_constraints(table.info, "method: expected gauss, got " + std::string(name_of(options.method)));
+    return make_explicit_system(table, plain, options);
+  }
   const SystemModel model(table, plain);
   const auto coordinates = static_cast<int>(model.coordinates());
   if (parts == 0) parts = coordinates;

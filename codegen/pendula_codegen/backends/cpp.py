@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
 from pendula_codegen.entry_points import Function, SystemKernel
-from pendula_codegen.model import Connection, Coordinate, Input, Parameter
+from pendula_codegen.model import Connection, Constraint, Coordinate, Input, Parameter
 from pendula_codegen.places import Place
 from pendula_codegen.polynomial import Number, as_double
 from pendula_codegen.program import Program
@@ -286,6 +286,8 @@ TYPES = {
     "points": "Points<Real>",
     "arguments": "Arguments<Real>",
     "switches": "Switches<Real>",
+    "constraints": "Constraints<Real>",
+    "constraint_slopes": "ConstraintSlopes<Real>",
     "link_vector": "LinkVector<Real>",
     "link_matrix": "LinkMatrix<Real>",
 }
@@ -384,8 +386,9 @@ def constants(
     switches: Sequence[str] = (),
     point_kinds: Sequence[str] = (),
     connections: Sequence[Connection] = (),
+    constraints: Sequence[Constraint] = (),
 ) -> list[str]:
-    """Static members by which a kernel says what it is; the last four where there are any."""
+    """Static members by which a kernel says what it is; the last five where there are any."""
     members = [
         ("std::string_view", "coordinate_names", [c.symbol.name for c in coordinates]),
         ("std::string_view", "coordinate_units", [c.unit for c in coordinates]),
@@ -409,6 +412,11 @@ def constants(
         members += [
             ("std::string_view", "connection_kinds", [each.kind for each in connections]),
             ("int", "connection_ends", [end for each in connections for end in each.ends]),
+        ]
+    if constraints:
+        members += [
+            ("std::string_view", "constraint_names", [each.name for each in constraints]),
+            ("std::string_view", "constraint_units", [each.unit for each in constraints]),
         ]
     lines = []
     for element, name, values in members:

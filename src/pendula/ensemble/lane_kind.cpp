@@ -39,6 +39,7 @@ bool name_chain(const RunSetup& setup, const RunOptions& options, bool with_tang
 bool name_kernel(const RunSetup& setup, const RunOptions& options, bool with_tangents, LaneKind& kind) {
   const auto* const system = dynamic_cast<const SystemSubject*>(setup.subject.get());
   if (system == nullptr || !has_lanes<Models>(options, with_tangents)) return false;
+  if (!system->info().constraints.empty()) return false;
   const bool by_series = options.method == Method::taylor;
   if (by_series && system->table().of_1.series_next == nullptr) return false;
   if (!is_explicit(options.method) && system->info().depends_on_time) return false;

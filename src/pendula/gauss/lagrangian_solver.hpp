@@ -14,6 +14,7 @@
 #include <pendula/gauss/system_forcing.hpp>
 #include <pendula/gauss/tableau.hpp>
 #include <pendula/gauss/wrong_root.hpp>
+#include <pendula/system/no_constraints.hpp>
 #include <pendula/system/options.hpp>
 #include <stdexcept>
 #include <string>
@@ -32,11 +33,11 @@ class LagrangianSolver : public StageIterations<LagrangianStages<Width, Form>> {
   using typename Base::State;
   static constexpr int sequences = 2;  ///< of corrections of its fixed point (FixedPointStop)
 
-  /// Throws std::invalid_argument unless the method has so many stages, at most Width.
+  /// Throws std::invalid_argument unless the method has so many stages, at most Width, and keeps constraints that are
+  /// there: Gauss methods in momentum form do, by fixed point.
   LagrangianSolver(const Model& model, int stages, Iteration iteration = Iteration::automatic,
                    Family family = Family::gauss)
-      : Base(Form::has_fixed_point ? iteration : Iteration::newton, newton_cost(model, stages), model, checked(stages),
-             family),
+      : Base(iteration_for(model, iteration, family), newton_cost(model, stages), model, checked(stages), family),
         family_(family),
         newton_(model.coordinates(), stages),
         forcing_(model, family, stages),
@@ -54,7 +55,7 @@ class LagrangianSolver : public StageIterations<LagrangianStages<Width, Form>> {
 
   Correction correct() {
     const Correction correction = Base::correct(newton_, coordinates());
-    is_complete_ = correction.convergence == Convergence::linear;
+    is_complete_ = correction.convergence == Convergence::linear && !stages_.is_constrained();
     return correction;
   }
 
@@ -105,9 +106,15 @@ class LagrangianSolver : public StageIterations<LagrangianStages<Width, Form>> {
     return brought;
   }
 
+  /// How far the accepted step ended from the constraints, and their rates from 0.
+  std::pair<double, double> constraint_errors() const { return stages_.constraint_errors(); }
+
   /// The derivative of the step that was solved and not yet accepted.
   using Tangent = LagrangianTangent<Width>;
-  Tangent make_tangent() const requires Form::is_symplectic { return Tangent(stages_); }
+  Tangent make_tangent() const requires Form::is_symplectic {
+    require_no_constraints(stages_.info(), "derivatives: expected none yet, got some");
+    return Tangent(stages_);
+  }
   void linearize(Tangent& tangent) const { tangent.linearize(stages_); }
 
  private:
@@ -121,6 +128,17 @@ class LagrangianSolver : public StageIterations<LagrangianStages<Width, Form>> {
                                 std::to_string(stages));
   }
 
+  static Iteration iteration_for(const Model& model, Iteration asked, Family family) {
+    const auto require = [&](bool keeps, const char* what) {
+      if (!keeps) require_no_constraints(model.info(), what);
+    };
+    require(family == Family::gauss, "method: expected gauss, got radau");
+    require(Form::has_fixed_point, "form: expected momentum, got velocity");
+    require(asked != Iteration::newton, "iteration: expected fixed-point, got newton");
+    if (!model.info().constraints.empty()) return Iteration::fixed_point;
+    return Form::has_fixed_point ? asked : Iteration::newton;
+  }
+
   // Cost of a Newton iteration in fixed-point iterations, to within a third, as measured on kernels of one to six
   // coordinates (g++ 12, AVX2 and AVX-512).
   static double newton_cost(const Model& model, int stages) {
@@ -129,9 +147,15 @@ class LagrangianSolver : public StageIterations<LagrangianStages<Width, Form>> {
 
   bool has_to_look() const { return !stages_.info().argument_is_base.empty(); }
 
-  // After Newton, what follows from its unknowns is that of those before its last correction.
+  // What constraints push at the end of the step. After Newton, what follows from its unknowns is that of those before
+  // its last correction.
   void complete() {
-    if (!is_complete_) newton_.follow(stages_);
+    if (is_complete_) return;
+    if (stages_.is_constrained()) {
+      stages_.finish_constraints();
+    } else {
+      newton_.follow(stages_);
+    }
     is_complete_ = true;
   }
 

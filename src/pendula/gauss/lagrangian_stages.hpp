@@ -4,6 +4,8 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <optional>
+#include <pendula/gauss/stage_constraints.hpp>
 #include <pendula/gauss/stage_dynamics.hpp>
 #include <pendula/gauss/stage_layout.hpp>
 #include <pendula/gauss/step_prediction.hpp>
@@ -12,6 +14,7 @@
 #include <pendula/gauss/system_motion.hpp>
 #include <pendula/numeric/lanes.hpp>
 #include <pendula/numeric/pack_rows.hpp>
+#include <pendula/system/increments.hpp>
 #include <pendula/system/motion.hpp>
 #include <pendula/system/outcome.hpp>
 #include <pendula/system/system_model.hpp>
@@ -38,22 +41,26 @@ class LagrangianStages : public SystemMotion<StagesInLanes<Eigen::Dynamic, doubl
   using Stored = double[static_cast<std::size_t>(Width)];
 
   LagrangianStages(const SystemModel& model, int stages, Family family)
-      : Base(StageDynamics<Width>(model), family, stages), weights_(2 * count_) {}
+      : Base(StageDynamics<Width>(model), family, stages), weights_(2 * count_) {
+    if (!info().constraints.empty()) constraints_.emplace(model, stages);
+  }
 
   const SystemModel& model() const { return dynamics_.model(); }
   using Base::columns, Base::count, Base::info;
   int stages() const { return columns_.stages(); }
+  bool is_constrained() const { return constraints_.has_value(); }
   double time_of(int stage) const { return time_ + columns_.h() * columns_.c(static_cast<std::size_t>(stage)); }
 
   double time_at(double share) const { return time_ + h() * share; }
 
   // --- The state ---
 
-  /// q, v  (coordinates).
+  /// q, v  (coordinates). Throws std::invalid_argument where they break constraints.
   Status start(double time, const double* q, const double* v) {
     time_ = time;
     prediction_ = {};
     fastest_ = fastest_here_ = most_kinetic_ = 0;
+    if (constraints_) constraints_->require(time, q, v);
     const SystemAt<1>& here = dynamics_.at(time);
     pace_.start(here, q, v);
     masses_.start(here, q);
@@ -83,6 +90,7 @@ class LagrangianStages : public SystemMotion<StagesInLanes<Eigen::Dynamic, doubl
   template <class Numbers>
   void member(Numbers& numbers) {
     numbers(time_, state_, turns_, prediction_, masses_, weights_, pace_, fastest_, most_kinetic_, newest_);
+    if (constraints_) numbers(*constraints_);
     for (auto& row : U_) numbers.range(row.numbers(), static_cast<std::size_t>(stages()));
     for (auto& past : pasts_) {
       for (auto& row : past) numbers.range(row.numbers(), static_cast<std::size_t>(stages()));
@@ -136,6 +144,7 @@ class LagrangianStages : public SystemMotion<StagesInLanes<Eigen::Dynamic, doubl
     Base::predict(time_, ratio, from);
     floor_ = Base::invisible * std::sqrt(Base::size_squared_);
     for (std::size_t k = 0; k < count_; ++k) weights_[count_ + k] = Form::size(std::abs(task.h), weight(k));
+    if (constraints_) prepare_constraints(ratio, from);
   }
 
   /// Predicts the stages as if the motion went on as it does at the start of the step.
@@ -146,10 +155,9 @@ class LagrangianStages : public SystemMotion<StagesInLanes<Eigen::Dynamic, doubl
 
   /// One fixed-point iteration, in momentum form; its change, relative to the size of the step.
   double iterate() {
-    const IterationChange found = at_stages()(
-        &SystemFunctions::iterate,
-        StageIteration{columns_.m(), columns_.each_hb(), state_.data(), weights_.data(), U_.front().numbers()});
-    return found.change == 0 ? 0 : found.change / std::max(found.size, floor());
+    const StageIteration on{columns_.m(), columns_.each_hb(), state_.data(), weights_.data(), U_.front().numbers()};
+    if (constraints_) return iterate_constrained(on);
+    return relative(at_stages()(&SystemFunctions::iterate, on));
   }
 
   /// Takes note of the first of these changes in a step.
@@ -222,7 +230,10 @@ class LagrangianStages : public SystemMotion<StagesInLanes<Eigen::Dynamic, doubl
   // --- What the solved stages show ---
 
   /// Energy that loads, and what holds time, bring in the step  [J].
-  double brought() const { return model().loaded() ? Base::work() : 0; }
+  double brought() {
+    if (!model().loaded()) return 0;
+    return Base::work() + (constraints_ && info().depends_on_time ? constraints_->work(state_.data()) : 0);
+  }
 
   /// The most that an angle turns in the step; one whose inertia nearly vanishes counts twice.
   double turn() const { return farthest_turn().first; }
@@ -232,12 +243,21 @@ class LagrangianStages : public SystemMotion<StagesInLanes<Eigen::Dynamic, doubl
   /// Energy at the end of the step less that of its start and what loads bring, relative to the largest kinetic energy
   /// so far.
   double energy_defect() {
-    const auto of = Base::balance(brought());
+    const auto of = Base::balance(brought(), end_pushes());
     most_kinetic_ = std::max(most_kinetic_, of.start.kinetic);
     const double scale = std::max(most_kinetic_, of.finish.kinetic) + std::abs(of.brought);
     return scale > 0 ? of.missing() / scale : 0;
   }
-  double imbalance() { return Base::imbalance(brought()); }
+  double imbalance() { return Base::imbalance(brought(), end_pushes()); }
+
+  /// R and d ln R/dt.
+  TempoOf<double> tempo() const {
+    if (!constraints_) return Base::tempo();
+    find_rates(time_);
+    dynamics_.here(time_, &SystemFunctions::acceleration, room(0), room(2), room(3));
+    constraints_->accelerate(time_, room(0), room(2), room(3));
+    return pace_.at(room(2), room(3));
+  }
 
   /// How far the polynomial through the stages' rates misses the rates at the start of the step, relative to the
   /// fastest so far; both as √(Σ M_kk v_k²).
@@ -300,7 +320,7 @@ class LagrangianStages : public SystemMotion<StagesInLanes<Eigen::Dynamic, doubl
     }
     alignas(pack_alignment) Stored coefficients;
     for (std::size_t k = 0; k < 2 * count_; ++k) {
-      columns_.legendre(U_[k].numbers()).store(coefficients);
+      columns_.legendre(numbers_along(k, coefficients)).store(coefficients);
       L gone(state_[k].compensation);
       for (int m = 0; m < stages(); ++m) gone = fma(L(coefficients[m]), integrals[static_cast<std::size_t>(m)], gone);
       (L(state_[k].value) + gone).store(found[k]);
@@ -326,9 +346,16 @@ class LagrangianStages : public SystemMotion<StagesInLanes<Eigen::Dynamic, doubl
   /// A coordinate whose inertia vanished where masses were looked at last; −1 where none did.
   int singular_coordinate() const { return masses_.singular(); }
 
+  std::pair<double, double> constraint_errors() const {
+    return constraints_ ? constraints_->errors() : std::pair<double, double>{};
+  }
+  /// Finds what constraints push at the end of the solved step.
+  void finish_constraints() { constraints_->finish(state_.data(), U_.front().numbers()); }
+
   /// Moves the state to the end of the step.
   void accept() {
     Base::move(true);
+    for (std::size_t k = 0; k < end_pushes().size(); ++k) state_[count_ + k].add(end_pushes()[k]);
     fastest_here_ = 0;
     prediction_.accept();
     if (!info().constant_masses || prediction_.steps() % 16 == 0) see_masses();
@@ -343,6 +370,50 @@ class LagrangianStages : public SystemMotion<StagesInLanes<Eigen::Dynamic, doubl
   Eigen::Index eigen_count() const { return index(count_); }
 
   double total(std::size_t k) const { return Columns::total(U_[k]); }
+
+  // --- Constraints, where the system has them ---
+
+  void prepare_constraints(double ratio, const StagePrediction<double>& from) {
+    find_rates(time_);
+    constraints_->prepare(time_, h(), room(0), weights_.data());
+    if (from.cold) {
+      dynamics_.here(time_, &SystemFunctions::acceleration, room(0), room(2), room(3));
+      constraints_->start_cold(room(0), room(2), room(3));
+    } else {
+      constraints_->predict(from.again ? 0 : 1, ratio);
+    }
+    constraints_->set_out(state_.data(), U_.front().numbers());
+  }
+
+  double relative(const IterationChange& found) const {
+    return found.change == 0 ? 0 : found.change / std::max(found.size, floor());
+  }
+
+  double iterate_constrained(const StageIteration& on) {
+    for (std::size_t k = 0; k < count_; ++k) {
+      reached(k).store(Base::call(0, 0, k));
+      (reached(count_ + k) + constraints_->pushed(k)).store(Base::call(0, 1, k));
+    }
+    at_stages()(&SystemFunctions::hamiltonian_form, Base::call(0, 0), Base::call(0, 1), Base::call(0, 2),
+                Base::call(0, 3));
+    const IterationChange found =
+        detail::replace_increments<Width>(on.hb, Base::call(0, 2), on.weights, 2 * count_, on.increments);
+    constraints_->correct(on.start, on.increments);
+    const double rounding = constraints_->rounding();
+    // What may be rounding looks like it: it goes on as long as it shrinks.
+    return found.change > rounding ? relative(found) : std::numeric_limits<double>::epsilon() * found.change / rounding;
+  }
+
+  std::span<const double> end_pushes() const {
+    return constraints_ ? constraints_->end_pushes() : std::span<const double>();
+  }
+
+  // Increments of a coordinate, or of its momentum with what constraints push.
+  const double* numbers_along(std::size_t k, double* room) const {
+    if (!constraints_ || k < count_) return U_[k].numbers();
+    (L::load(U_[k].numbers()) + constraints_->as_increments(k - count_)).store(room);
+    return room;
+  }
 
   L reached(std::size_t k) const {
     return L(state_[k].value) + columns_.integral(U_[k].numbers(), L(state_[k].compensation));
@@ -371,7 +442,8 @@ class LagrangianStages : public SystemMotion<StagesInLanes<Eigen::Dynamic, doubl
     for (std::size_t k = 0; k < count_; ++k) weights_[k] = std::sqrt(masses_.inertia(k));
   }
 
-  std::vector<double> weights_;  // √M_kk; then that of changes of momenta, times h
+  std::vector<double> weights_;                                 // √M_kk; then that of changes of momenta, times h
+  mutable std::optional<StageConstraints<Width>> constraints_;  // where it looks at a state, too
   double floor_ = 0, most_kinetic_ = 0;
   StepPrediction prediction_;
 };

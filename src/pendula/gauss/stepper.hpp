@@ -314,6 +314,11 @@ class GaussStepper : private StepSolution<Solver> {
       if (linearization_ && !looks_) solver_.linearize(linearization_->next());
     }
     statistics_.load_work += solver_.accept();
+    if constexpr (requires { solver_.constraint_errors(); }) {
+      const auto [place, rate] = solver_.constraint_errors();
+      statistics_.constraint_error = std::max(statistics_.constraint_error, place);
+      statistics_.constraint_rate_error = std::max(statistics_.constraint_rate_error, rate);
+    }
     time_.add(h);
     outcome.time = time();
     return outcome;

@@ -13,6 +13,7 @@
 #include <pendula/numeric/written_out.hpp>
 #include <pendula/system/mass_scale.hpp>
 #include <pendula/system/system_table.hpp>
+#include <span>
 #include <type_traits>
 #include <vector>
 
@@ -109,8 +110,8 @@ class SystemMotion {
 
   /// The size of the energy error of the step, `brought` being the work of loads; relative to kinetic and potential
   /// energy, or to the energy that motion from rest comes to where that is larger.
-  Num imbalance(const Num& brought) const {
-    const Balance of = balance(brought);
+  Num imbalance(const Num& brought, std::span<const double> pushes = {}) const {
+    const Balance of = balance(brought, pushes);
     const Num scale = max(max(of.start.size(), of.finish.size()), pace_.natural_speed_squared()) + abs(brought);
     return select(scale > Num(0.0), abs(of.missing()) / scale, Num(0.0));
   }
@@ -199,11 +200,13 @@ class SystemMotion {
     return {from_row<Num>(room(4)), from_row<Num>(room(4, 1))};
   }
 
-  Balance balance(const Num& brought) const {
+  // `pushes` come to momenta besides increments; there may be none.
+  Balance balance(const Num& brought, std::span<const double> pushes = {}) const {
     find_rates(time_);
     const Energies start = energies(time_);
     const auto end = [&](std::size_t k) { return (state_[k].compensation + Columns::total(U_[k])) + state_[k].value; };
     for (std::size_t k = 0; k < 2 * count_; ++k) to_row(Num(end(k)), room(0, k));
+    for (std::size_t k = 0; k < pushes.size(); ++k) to_row(from_row<Num>(room(1, k)) + Num(pushes[k]), room(1, k));
     const Num then = time_ + columns_.h();
     rates_of_room(then);
     return {brought, start, energies(then)};

@@ -21,6 +21,7 @@ constexpr double short_run = 100;  // steps
 /// Why Taylor series are not chosen for a subject: it has none, or Gauss steps take less time. Empty if they may be.
 std::string against_series(const Subject& subject, double tolerance) {
   if (const auto* const system = dynamic_cast<const SystemSubject*>(&subject)) {
+    if (!system->info().constraints.empty()) return "constraints";
     if (system->table().of_1.series_next == nullptr) return "no series in the kernel";
     if (system->info().coordinates.size() > most_coordinates) return "many coordinates";
     if (system->info().depends_on_time) return "time in the equations";

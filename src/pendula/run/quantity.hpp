@@ -8,7 +8,7 @@
 namespace pendula {
 
 /// Kinds of quantities of a trajectory; those up to rates are its time and state.
-enum class Role { time, coordinate, rate, input, point, energy, own };
+enum class Role { time, coordinate, rate, input, point, force, energy, own };
 
 /// A quantity of a trajectory: one number per row, or one for each link.
 struct Quantity {
@@ -20,6 +20,8 @@ struct Quantity {
   std::size_t links = 0;   ///< 0: one number, not of a link
   std::size_t stride = 1;  ///< columns from link to link
 
+  /// Whether it is part of an Observation.
+  bool is_observed() const { return role == Role::point || role == Role::force || role == Role::energy; }
   std::size_t size() const { return links == 0 ? 1 : links; }
   std::size_t column(std::size_t k) const { return first + k * stride; }
   bool holds(std::size_t at) const {

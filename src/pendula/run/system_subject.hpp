@@ -8,6 +8,8 @@
 #include <pendula/run/library.hpp>
 #include <pendula/run/subject.hpp>
 #include <pendula/run/switching.hpp>
+#include <pendula/system/constraint_forces.hpp>
+#include <pendula/system/no_constraints.hpp>
 #include <pendula/system/plain_system.hpp>
 #include <pendula/system/system_model.hpp>
 #include <pendula/system/system_table.hpp>
@@ -73,6 +75,7 @@ class SystemSubject : public Subject {
       throw std::invalid_argument("solver: the chain solver is for chains, got chain; dense is for any system");
     }
     if (!switches().empty()) {
+      require_no_constraints(info(), "model: expected no functions of several pieces yet, got some");
       return std::make_unique<Integrator>(make_switching_integrator(switching(), options),
                                           static_cast<Eigen::Index>(info().coordinates.size()), "system");
     }
@@ -88,6 +91,7 @@ class SystemSubject : public Subject {
     const Conditions at = conditions(motion.time, numbers);
     table_->of_1.energies(at, motion.q.data(), motion.v.data(), &seen.kinetic, &seen.energy);
     if (seen.points.size() > 0) table_->plain.positions(at, motion.q.data(), seen.points.data());
+    if (!info().constraints.empty()) seen.forces = constraint_forces(motion, numbers);
     return seen;
   }
 
@@ -141,6 +145,11 @@ class SystemSubject : public Subject {
             std::string(name).append(" of the point ").append(point));
       }
     }
+    for (std::size_t k = 0; k < info().constraints.size(); ++k) {
+      const std::string name(info().constraints[k]), unit(info().constraint_units[k]);
+      add("force_" + name, unit == "1" || unit.empty() ? "J" : "J/(" + unit + ")", Role::force,
+          "force of the constraint " + name);
+    }
     add("energy", "J", Role::energy, "energy v dL/dv - L");
     return quantities;
   }
@@ -162,6 +171,7 @@ class SystemSubject : public Subject {
     row.insert(row.end(), motion.v.begin(), motion.v.end());
     append_inputs(motion, row);
     row.insert(row.end(), seen.points.begin(), seen.points.end());
+    row.insert(row.end(), seen.forces.begin(), seen.forces.end());
     row.push_back(seen.energy);
   }
 
@@ -221,6 +231,18 @@ class SystemSubject : public Subject {
     if (got == expected) return;
     throw std::invalid_argument(std::string(what) + ": expected " + std::to_string(expected) + " numbers for " +
                                 std::string(info().name) + ", got " + std::to_string(got));
+  }
+
+  // λ of a state, by which it stays on the constraints.
+  Eigen::VectorXd constraint_forces(const Motion& motion, const SystemNumbers& numbers) const {
+    SystemAt<1> here(SystemModel(*table_, numbers.plain()));
+    here.set_time(motion.time);
+    ConstraintForces constraints(info());
+    Eigen::VectorXd a(motion.q.size()), lambda(std::ssize(info().constraints));
+    here(&SystemFunctions::acceleration, motion.q.data(), motion.v.data(), a.data());
+    constraints.look(here, motion.q.data());
+    constraints.find(here, motion.q.data(), motion.v.data(), a.data(), lambda.data());
+    return lambda;
   }
 
   // For functions that do not depend on inputs; both must outlive the result.

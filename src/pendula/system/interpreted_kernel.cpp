@@ -27,6 +27,8 @@ enum class Rows {
   components,
   arguments,
   switches,
+  constraints,
+  constraint_slopes,
   state,
   order,
   sums,
@@ -80,6 +82,8 @@ constexpr std::array<Signature, Program::many + Program::plain + Program::series
        {"dp", Rows::coordinates},
        {"df", Rows::coordinates}}}},
     {"call_arguments", 2, {q, v, {"found", Rows::arguments}}},
+    {"constraints", 1, {q, {"g", Rows::constraints}, {"g_D_q", Rows::constraint_slopes}}},
+    {"constraint_rates", 2, {q, v, {"g_dot", Rows::constraints}, {"g_ddot", Rows::constraints}}},
     {"series_start_along",
      5,
      {{{"unit", Rows::one},
@@ -278,6 +282,10 @@ class OwnedKernel {
         return info.argument_is_base.size();
       case Rows::switches:
         return info.switches.size();
+      case Rows::constraints:
+        return info.constraints.size();
+      case Rows::constraint_slopes:
+        return info.constraints.size() * n;
       case Rows::state:
         return 2 * n;
       case Rows::order:
@@ -307,15 +315,12 @@ class OwnedKernel {
       if (is_of_tangents(k) && !there) continue;
       if (wanted != there) lines.fail((wanted ? "" : "no ") + std::string(signature.name), wanted ? "none" : "one");
     }
-    if (program_.functions[Program::series_start_along].code.empty() ||
-        program_.functions[Program::series_next_along].code.empty()) {
-      for (SystemFunctions* of : {&table_.of_1, &table_.of_2, &table_.of_4, &table_.of_8}) {
-        of->series_start_along = nullptr;
-        of->series_next_along = nullptr;
-      }
-    }
-    if (info.argument_is_base.empty()) {
-      for (SystemFunctions* of : {&table_.of_1, &table_.of_2, &table_.of_4, &table_.of_8}) of->call_arguments = nullptr;
+    const bool lacks_tangents = program_.functions[Program::series_start_along].code.empty() ||
+                                program_.functions[Program::series_next_along].code.empty();
+    for (SystemFunctions* of : {&table_.of_1, &table_.of_2, &table_.of_4, &table_.of_8}) {
+      if (lacks_tangents) of->series_start_along = nullptr, of->series_next_along = nullptr;
+      if (info.argument_is_base.empty()) of->call_arguments = nullptr;
+      if (info.constraints.empty()) of->constraints = nullptr, of->constraint_rates = nullptr;
     }
     if (info.switches.empty()) table_.plain.switches = nullptr;
     if (info.points.empty()) table_.plain.positions = nullptr, table_.plain.velocities = nullptr;

@@ -1,17 +1,15 @@
 #pragma once
 
-#include <algorithm>
 #include <array>
-#include <cmath>
 #include <cstddef>
 #include <cstdint>
-#include <limits>
 #include <pendula/numeric/dual.hpp>
 #include <pendula/numeric/functions.hpp>
 #include <pendula/numeric/lanes.hpp>
 #include <pendula/numeric/numbers_of_states.hpp>
 #include <pendula/numeric/pack_rows.hpp>
 #include <pendula/numeric/stage_product.hpp>
+#include <pendula/system/increments.hpp>
 #include <pendula/system/program.hpp>
 #include <pendula/system/program_operations.hpp>
 #include <pendula/system/series_sums.hpp>
@@ -32,8 +30,9 @@ class Interpreter : NumbersOfStates<W> {
 
  public:
   static constexpr SystemFunctions functions() {
-    return {&call<0>, &call<1>,  &call<2>,  &call<3>,  &call<4>,  &call<5>,  &call<6>, &call<7>,      &call<8>,
-            &call<9>, &call<10>, &call<11>, &call<12>, &call<13>, &call<14>, &iterate, &series_start, &series_next};
+    return {&call<0>,  &call<1>,  &call<2>,  &call<3>,  &call<4>,      &call<5>,    &call<6>,
+            &call<7>,  &call<8>,  &call<9>,  &call<10>, &call<11>,     &call<12>,   &call<13>,
+            &call<14>, &call<15>, &call<16>, &iterate,  &series_start, &series_next};
   }
   static constexpr PlainFunctions plain_functions() {
     constexpr std::size_t first = Program::many;
@@ -172,22 +171,7 @@ class Interpreter : NumbersOfStates<W> {
       there.store(reached + k * width);
     }
     functions().hamiltonian_form(at, reached, reached + rows / 2 * width, found, found + rows / 2 * width);
-    const Lanes hb = Lanes::load(on.hb);
-    Lanes largest(0.0), scale(0.0), all(0.0);
-    for (std::size_t k = 0; k < rows; ++k) {
-      double* const increments = on.increments + k * width;
-      const Lanes weight(on.weights[k]), now = hb * Lanes::load(found + k * width);
-      const Lanes change = now - Lanes::load(increments);
-      largest = max(largest, weight * abs(change));
-      scale = max(scale, weight * abs(now));
-      all = all + change;
-      now.store(increments);
-    }
-    // A NaN change reaches the sum, though not always the maximum.
-    double total = 0;
-    for (const double sum : each_of(all)) total += sum;
-    const double size = std::ranges::max(each_of(scale));
-    return {std::isfinite(total) ? std::ranges::max(each_of(largest)) : std::numeric_limits<double>::quiet_NaN(), size};
+    return replace_increments<W>(on.hb, found, on.weights, rows, on.increments);
   }
 
   // --- Taylor series ---
@@ -240,12 +224,6 @@ class Interpreter : NumbersOfStates<W> {
                                        const_cast<double*>(inputs)};
     for (std::size_t k = 0; k < count; ++k) all[3 + k] = const_cast<double*>(arrays[k]);
     run(function, all.data());
-  }
-
-  static std::array<double, width> each_of(const Lanes& numbers) {
-    std::array<double, width> each;
-    numbers.store_unaligned(each.data());
-    return each;
   }
 };
 

@@ -78,6 +78,10 @@ class Widths {
     if (table_.of_1.call_arguments != nullptr) {
       compare(&Of::call_arguments, {&q_, &v_}, {table_.info.argument_is_base.size()});
     }
+    if (const std::size_t count = table_.info.constraints.size(); count > 0) {
+      compare(&Of::constraints, {&q_}, {count, count * n_});
+      compare(&Of::constraint_rates, {&q_, &v_}, {count, count});
+    }
     compare_iteration(1);
     for (const std::size_t width : widths) compare_iteration(width);
     return worst_.error;

@@ -40,6 +40,10 @@ void evaluate_kernel(const SystemTable& table, const PlainSystem& system, double
     write({points}, table.plain.positions, q);
     write({points}, table.plain.velocities, q, v);
   }
+  if (const std::size_t count = info.constraints.size(); count > 0) {
+    write({count, count * n}, of.constraints, q);
+    write({count, count}, of.constraint_rates, q, v);
+  }
   write({n}, of.acceleration, q, v);
   write({n}, of.velocity_from_momentum, q, momenta);
   write({n, n}, of.hamiltonian_form, q, momenta);
@@ -51,7 +55,8 @@ KernelComparison::KernelComparison(const SystemTable& table, std::span<const dou
       n_(static_cast<int>(table.info.coordinates.size())),
       components_(std::accumulate(table.info.point_sizes.begin(), table.info.point_sizes.end(), 0)),
       parameters_(std::accumulate(table.info.parameter_sizes.begin(), table.info.parameter_sizes.end(), 0)),
-      inputs_(static_cast<int>(table.info.inputs.size())) {
+      inputs_(static_cast<int>(table.info.inputs.size())),
+      constraints_(static_cast<int>(table.info.constraints.size())) {
   int numbers = 0;
   for (int k = 0; k < written_count; ++k) {
     places_[static_cast<std::size_t>(k)] = numbers;
@@ -134,6 +139,7 @@ std::vector<KernelLine> KernelComparison::check() const {
   const std::size_t powers = add("power of the forces");
   const std::size_t solutions = add("accelerations and rates, solved for");
   const std::size_t points = components_ > 0 ? add("points and their velocities") : 0;
+  const std::size_t constraints = constraints_ > 0 ? add("constraints, their slopes and rates") : 0;
   const auto line_of = [&](Written what) {
     switch (what) {
       case Written::kinetic_energy:
@@ -156,6 +162,11 @@ std::vector<KernelLine> KernelComparison::check() const {
       case Written::positions:
       case Written::velocities:
         return points;
+      case Written::constraints:
+      case Written::constraints_q:
+      case Written::constraint_rates:
+      case Written::constraint_second_rates:
+        return constraints;
       default:
         return residuals;
     }

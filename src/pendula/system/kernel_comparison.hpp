@@ -30,11 +30,15 @@ enum class Written {
   velocities,
   momenta_at_rest,   ///< ∂L/∂v at v = 0
   residual_at_rest,  ///< E at a = 0
+  constraints,
+  constraints_q,
+  constraint_rates,
+  constraint_second_rates,  ///< at a = 0
 };
-inline constexpr int written_count = 16;
+inline constexpr int written_count = 20;
 
 /// How many numbers a quantity has, for a system of n coordinates.
-constexpr int written_size(Written what, int n, int point_components) {
+constexpr int written_size(Written what, int n, int point_components, int constraints) {
   switch (what) {
     case Written::kinetic_energy:
     case Written::energy:
@@ -50,6 +54,12 @@ constexpr int written_size(Written what, int n, int point_components) {
     case Written::positions:
     case Written::velocities:
       return point_components;
+    case Written::constraints:
+    case Written::constraint_rates:
+    case Written::constraint_second_rates:
+      return constraints;
+    case Written::constraints_q:
+      return constraints * n;
     default:
       return n;
   }
@@ -57,15 +67,30 @@ constexpr int written_size(Written what, int n, int point_components) {
 
 /// The order in which evaluate_kernel writes. A quantity occurs several times if several functions of a kernel return
 /// it.
-inline constexpr std::array kernel_outputs = {
-    Written::kinetic_energy, Written::energy,     Written::mass,        // a function each
-    Written::momenta,                                                   // momentum_from_velocity
-    Written::momenta,        Written::forces,                           // momentum_form
-    Written::momenta,        Written::forces,     Written::momenta_q,   // momentum_form_with_jacobians
-    Written::mass,           Written::forces_q,   Written::forces_v,    //
-    Written::residual,                                                  // residual
-    Written::residual,       Written::residual_q, Written::residual_v,  // residual_with_jacobians
-    Written::mass,           Written::power,      Written::positions,  Written::velocities};
+inline constexpr std::array kernel_outputs = {Written::kinetic_energy,
+                                              Written::energy,
+                                              Written::mass,     // a function each
+                                              Written::momenta,  // momentum_from_velocity
+                                              Written::momenta,
+                                              Written::forces,  // momentum_form
+                                              Written::momenta,
+                                              Written::forces,
+                                              Written::momenta_q,  // momentum_form_with_jacobians
+                                              Written::mass,
+                                              Written::forces_q,
+                                              Written::forces_v,  //
+                                              Written::residual,  // residual
+                                              Written::residual,
+                                              Written::residual_q,
+                                              Written::residual_v,  // residual_with_jacobians
+                                              Written::mass,
+                                              Written::power,
+                                              Written::positions,
+                                              Written::velocities,
+                                              Written::constraints,
+                                              Written::constraints_q,  // constraints
+                                              Written::constraint_rates,
+                                              Written::constraint_second_rates};
 
 /// What evaluate_kernel writes after these, n numbers each: solutions of linear systems.
 enum class Solved {
@@ -104,7 +129,7 @@ class KernelComparison {
     double roundings(double computed) const { return computed == value ? 0 : std::abs(computed - value) / size(); }
   };
 
-  int size(Written what) const { return written_size(what, n_, components_); }
+  int size(Written what) const { return written_size(what, n_, components_, constraints_); }
   const double* arguments(std::size_t point) const { return said_.data() + 1 + point * point_size_; }
   Truth truth(std::size_t point, Written what, int k) const {
     const double* pair = arguments(point) + arguments_ + 2 * (places_[static_cast<std::size_t>(what)] + k);
@@ -117,7 +142,7 @@ class KernelComparison {
 
   const SystemTable& table_;
   std::span<const double> said_;
-  int n_, components_, parameters_, inputs_;
+  int n_, components_, parameters_, inputs_, constraints_;
   int arguments_ = 0, outputs_ = 0;
   std::size_t point_size_ = 0, count_ = 0;
   std::array<int, written_count> places_{};

@@ -49,6 +49,8 @@ class KernelFunctions : KernelNumbers<S, W> {
             &acceleration_along,
             &momentum_form_along,
             tells_arguments<S> ? &call_arguments : nullptr,
+            has_constraints<S> ? &constraints : nullptr,
+            has_constraints<S> ? &constraint_rates : nullptr,
             has_series<S> && W == 8 ? &KernelSeries<S, W>::start_along : nullptr,
             has_series<S> && W == 8 ? &KernelSeries<S, W>::next_along : nullptr,
             &iterate,
@@ -159,6 +161,24 @@ class KernelFunctions : KernelNumbers<S, W> {
       typename S::template Arguments<L> found;
       S::call_arguments(parameters(at), vector(q), vector(v), inputs(at), found);
       write(found, arguments);
+    }
+  }
+
+  static void constraints(const Conditions& at, const double* q, double* g, double* g_D_q) {
+    if constexpr (has_constraints<S>) {
+      typename S::template Constraints<L> found;
+      typename S::template ConstraintSlopes<L> slopes;
+      S::constraints(parameters(at), vector(q), found, slopes);
+      write(found, g);
+      write(slopes, g_D_q);
+    }
+  }
+  static void constraint_rates(const Conditions& at, const double* q, const double* v, double* g_dot, double* g_ddot) {
+    if constexpr (has_constraints<S>) {
+      typename S::template Constraints<L> first, second;
+      S::constraint_rates(parameters(at), vector(q), vector(v), first, second);
+      write(first, g_dot);
+      write(second, g_ddot);
     }
   }
 

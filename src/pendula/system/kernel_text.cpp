@@ -104,6 +104,9 @@ bool KernelDescription::take(KernelText& text) {
     argument_is_base_.push_back(text.flag());
   } else if (kind == "switch") {
     switches_.push_back(text.word());
+  } else if (kind == "constraint") {
+    constraints_.push_back(text.word());
+    constraint_units_.push_back(text.word());
   } else if (kind == "series") {
     series_.has_momenta = text.flag();
     series_.sums = text.whole(0, many);
@@ -153,7 +156,9 @@ SystemInfo KernelDescription::info() const {
           point_kinds_,
           connection_kinds_,
           connection_ends_,
-          sums_};
+          sums_,
+          constraints_,
+          constraint_units_};
 }
 
 }  // namespace pendula

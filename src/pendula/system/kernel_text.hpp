@@ -69,7 +69,7 @@ class KernelDescription {
   SeriesInfo series_;
   bool depends_on_time_ = false, constant_masses_ = false;
   Names coordinates_, coordinate_units_, parameters_, parameter_units_, inputs_, input_units_, points_, switches_,
-      point_kinds_, connection_kinds_;
+      constraints_, constraint_units_, point_kinds_, connection_kinds_;
   Flags is_angle_, is_periodic_, is_positive_, is_per_link_, argument_is_base_;
   std::vector<int> parameter_sizes_, point_sizes_, connection_ends_;
   std::vector<double> parameter_defaults_;

@@ -144,6 +144,7 @@ struct Statistics {
   /// Effects that steps missed between their stages, summed, relative to the speed of the motion; the time from which
   /// rows show them  [s].
   double unseen = 0, unseen_from = std::numeric_limits<double>::infinity();
+  double constraint_error = 0, constraint_rate_error = 0;  ///< the largest after a step, each in its unit
 
   /// Counts an adaptive step.
   void count_chosen(double h) {
@@ -174,6 +175,8 @@ struct Statistics {
     largest_step = std::max(largest_step, other.largest_step);
     unseen += other.unseen;
     unseen_from = std::min(unseen_from, other.unseen_from);
+    constraint_error = std::max(constraint_error, other.constraint_error);
+    constraint_rate_error = std::max(constraint_rate_error, other.constraint_rate_error);
     return *this;
   }
 
@@ -189,7 +192,7 @@ struct Statistics {
   template <class Numbers>
   void member(Numbers& numbers) {
     numbers(steps, rejected_steps, newton_iterations, load_work, largest_defect, smallest_step, largest_step, unseen,
-            unseen_from);
+            unseen_from, constraint_error, constraint_rate_error);
   }
 };
 

@@ -63,6 +63,8 @@ struct SystemInfo {
   std::span<const std::string_view> connection_kinds;  ///< "spring", "thread" or "pulleys"
   std::span<const int> connection_ends;                ///< two for each connection: 0-based points, -1 is the origin
   std::span<const SeriesSum> series_sums;              ///< (SeriesInfo::sums)
+  /// What is 0 at all times (SystemFunctions::constraints).
+  std::span<const std::string_view> constraints, constraint_units;
 
   /// Number of parameters of the model itself, without the last ones, which tell the sides of switching functions.
   std::size_t own_parameters() const { return parameters.size() - 2 * switches.size(); }
@@ -96,7 +98,9 @@ constexpr SystemInfo info_of() {
           point_kinds<S>(),
           connection_kinds<S>(),
           connection_ends<S>(),
-          series_sums_of<S>()};
+          series_sums_of<S>(),
+          constraint_names<S>(),
+          constraint_units<S>()};
 }
 
 }  // namespace pendula

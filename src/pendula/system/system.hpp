@@ -77,6 +77,24 @@ constexpr std::span<const std::string_view> switch_names() {
   return {};
 }
 
+/// Whether a kernel has constraints (S::constraints).
+template <class S>
+inline constexpr bool has_constraints = requires {
+  S::constraint_names;
+};
+
+/// What they are called, and their units; empty if there are none.
+template <class S>
+constexpr std::span<const std::string_view> constraint_names() {
+  if constexpr (has_constraints<S>) return S::constraint_names;
+  return {};
+}
+template <class S>
+constexpr std::span<const std::string_view> constraint_units() {
+  if constexpr (has_constraints<S>) return S::constraint_units;
+  return {};
+}
+
 /// What the points of a kernel are drawn as; empty if the kernel does not say.
 template <class S>
 constexpr std::span<const std::string_view> point_kinds() {

@@ -1,0 +1,324 @@
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <limits>
+#include <pendula/gauss/lobatto_nodes.hpp>
+#include <pendula/numeric/compensated.hpp>
+#include <pendula/numeric/pack_rows.hpp>
+#include <pendula/system/constraint_forces.hpp>
+#include <pendula/system/system_model.hpp>
+#include <span>
+#include <sstream>
+#include <stdexcept>
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace pendula {
+
+/// Constraints of a system in a step of a Gauss method: they hold at Lobatto nodes (LobattoNodes), by impulses there.
+/// Of the last node, the impulse makes rates keep the constraints, too.
+template <int Width>
+class StageConstraints {
+  static constexpr auto width = static_cast<std::size_t>(Width);
+  using Rows = PackRows<width>;
+
+ public:
+  using L = typename LobattoNodes<Width>::L;
+
+  StageConstraints(const SystemModel& model, int stages)
+      : nodes_(stages),
+        at_nodes_(model),
+        here_(model),
+        start_(model.info()),
+        end_(model.info()),
+        count_(start_.count()),
+        coordinates_(model.coordinates()),
+        impulses_(count_),
+        pushes_(coordinates_),
+        places_(coordinates_),
+        still_(coordinates_),
+        values_(count_),
+        slopes_(count_ * coordinates_),
+        rates_(2 * count_),
+        first_(count_),
+        last_(count_),
+        end_push_(coordinates_),
+        room_(3 * coordinates_),
+        start_place_(coordinates_),
+        lacking_(count_ * nodes_.stages()),
+        moved_(lacking_.size() * coordinates_),
+        inverse_(lacking_.size() * lacking_.size()),
+        masses_(static_cast<Eigen::Index>(coordinates_)),
+        responses_(static_cast<Eigen::Index>(lacking_.size())) {}
+
+  /// Adds to accelerations what constraints bring in a state.
+  void accelerate(double time, const double* q, const double* v, double* a) {
+    here_.set_time(time);
+    start_.look(here_, q);
+    start_.find(here_, q, v, a, first_.data());
+    start_.move(first_.data(), a);
+  }
+
+  /// A step of h begins at q. Changes of coordinates are weighed.
+  void prepare(double time, double h, const double* q, const double* weights) {
+    time_ = time;
+    h_ = h;
+    here_.set_time(time);
+    start_.look(here_, q);
+    std::copy_n(q, coordinates_, start_place_.begin());
+    find_rounding(q, weights);
+    at_nodes_.set_times([&](std::size_t k) { return time + h * nodes_.d(std::min(k + 1, nodes_.stages())); });
+  }
+
+  /// Impulses as at the start of the step, for accelerations a without constraints.
+  void start_cold(const double* q, const double* v, const double* a) {
+    start_.find(here_, q, v, a, first_.data());
+    for (std::size_t i = 0; i < count_; ++i) {
+      std::fill_n(impulses_[i], width, 0.0);  // where an iteration has failed, nothing is left of it
+      for (std::size_t k = 0; k < nodes_.stages(); ++k) impulses_[i][k] = h_ * nodes_.w(k) * first_[i];
+    }
+  }
+  /// Impulses that continue those of the last step (LobattoNodes::predict_at).
+  void predict(double from, double ratio) {
+    nodes_.predict_at(from, ratio);
+    for (std::size_t i = 0; i < count_; ++i) nodes_.predicted(impulses_[i]).store(impulses_[i]);
+  }
+  /// Finds what these push on the way that increments are predicted to lead  (2 coordinates).
+  void set_out(const Compensated<double>* start, const double* increments) {
+    look(start, increments);
+    push();
+    find_inverse();
+  }
+
+  /// What impulses add to the momentum of coordinate k at the stages, and increments that would add it.
+  L pushed(std::size_t k) const { return nodes_.pushed(pushes_[k]); }
+  L as_increments(std::size_t k) const { return nodes_.as_increments(pushes_[k]); }
+
+  /// Corrects the impulses by what constraints lack where increments lead to.
+  void correct(const Compensated<double>* start, const double* increments) {
+    look(start, increments);
+    const std::size_t all = count_ * nodes_.stages();
+    for (std::size_t k = 0; k < nodes_.stages(); ++k) {
+      for (std::size_t i = 0; i < count_; ++i) lacking_[k * count_ + i] = values_[i][k] / h_;
+    }
+    for (std::size_t m = 0; m < nodes_.stages(); ++m) {
+      for (std::size_t j = 0; j < count_; ++j) {
+        const double* const row = inverse_.data() + (m * count_ + j) * all;
+        double sum = 0;
+        for (std::size_t at = 0; at < all; ++at) sum += row[at] * lacking_[at];
+        impulses_[j][m] -= sum;
+      }
+    }
+    push();
+  }
+
+  /// What rounding of coordinates, by way of the constraints, makes of increments; as changes are weighed.
+  double rounding() const { return rounding_; }
+
+  /// Finds the impulse at the end of the solved step, which the momenta reach without it from `start`  (2 coordinates).
+  void finish(const Compensated<double>* start, const double* increments) {
+    double *const q = room_.data(), *const p = q + coordinates_, *const v = p + coordinates_;
+    for (std::size_t k = 0; k < coordinates_; ++k) {
+      end_push_[k] = total(pushes_[k]);
+      q[k] = end(start[k], increments + k * width, 0);
+    }
+    here_.set_time(time_ + h_);
+    end_.look(here_, q);
+    std::fill(last_.begin(), last_.end(), 0.0);
+    for (int correction = 0; correction < 2; ++correction) {
+      for (std::size_t k = 0; k < coordinates_; ++k) {
+        const std::size_t momentum = coordinates_ + k;
+        p[k] = end(start[momentum], increments + momentum * width, end_push_[k]);
+      }
+      here_(&SystemFunctions::velocity_from_momentum, q, p, v);
+      end_.stop(here_, q, v, first_.data());
+      for (std::size_t i = 0; i < count_; ++i) {
+        last_[i] += first_[i];
+        for (std::size_t k = 0; k < coordinates_; ++k) end_push_[k] += end_.slope(i, k) * first_[i];
+      }
+    }
+  }
+
+  /// The largest value of a constraint at the end of the finished step, and the largest rate.
+  std::pair<double, double> errors() const {
+    double place = 0, rate = 0;
+    for (std::size_t i = 0; i < count_; ++i) {
+      place = std::max(place, std::abs(end_.value(i)));
+      rate = std::max(rate, std::abs(end_.rate(i)));
+    }
+    return {place, rate};
+  }
+
+  /// What all impulses of the finished step add to momenta  (coordinates).
+  std::span<const double> end_pushes() const { return end_push_; }
+
+  /// Energy that constraints which move bring in the finished step  [J].
+  double work(const Compensated<double>* start) {
+    double *const q = room_.data(), *const still = q + coordinates_;
+    for (std::size_t k = 0; k < coordinates_; ++k) {
+      q[k] = start[k].value;
+      still[k] = 0;
+    }
+    here_.set_time(time_);
+    start_.stop(here_, q, still, first_.data());
+    at_nodes_(&SystemFunctions::constraint_rates, places_[0], still_[0], rates_[0], rates_[count_]);
+    double work = 0;
+    for (std::size_t i = 0; i < count_; ++i) {
+      const double* const moved = rates_[i];
+      work -= impulses_[i][0] * start_.rate(i) + last_[i] * moved[nodes_.stages() - 1];
+      for (std::size_t node = 1; node < nodes_.stages(); ++node) work -= impulses_[i][node] * moved[node - 1];
+    }
+    return work;
+  }
+
+  /// Throws std::invalid_argument unless a state keeps the constraints, and they can be told apart there.
+  void require(double time, const double* q, const double* v) {
+    here_.set_time(time);
+    start_.look(here_, q);
+    start_.stop(here_, q, v, first_.data());
+    for (std::size_t i = 0; i < count_; ++i) {
+      double speed = 0;
+      for (std::size_t k = 0; k < coordinates_; ++k) speed += std::abs(start_.slope(i, k) * v[k]);
+      require(i, "0", start_.value(i), size(i, q));
+      require(i, "a rate of 0", start_.rate(i), speed);
+      if (!std::isfinite(first_[i])) fail(i, "one that others do not contain where the motion starts, got none");
+    }
+  }
+
+  template <class Numbers>
+  void member(Numbers& numbers) {
+    for (std::size_t i = 0; i < count_; ++i) numbers.range(impulses_[i], nodes_.stages());
+  }
+
+ private:
+  static double total(const double* numbers) {
+    double sum = 0;
+    for (std::size_t k = 0; k < width; ++k) sum += numbers[k];
+    return sum;
+  }
+  static double end(const Compensated<double>& start, const double* increments, double more) {
+    return start.value + (start.compensation + (total(increments) + more));
+  }
+
+  // Coordinates and constraints at the nodes.
+  void look(const Compensated<double>* start, const double* increments) {
+    for (std::size_t k = 0; k < coordinates_; ++k) {
+      (L(start[k].value) + nodes_.reached(increments + k * width, L(start[k].compensation))).store(places_[k]);
+    }
+    at_nodes_(&SystemFunctions::constraints, places_[0], values_[0], slopes_[0]);
+  }
+
+  void find_rounding(const double* q, const double* weights) {
+    for (std::size_t i = 0; i < count_; ++i) first_[i] = size(i, q);
+    rounding_ = 0;
+    double most = 0;
+    for (std::size_t k = 0; k < coordinates_; ++k) {
+      double sum = 0;
+      for (std::size_t i = 0; i < count_; ++i) {
+        for (std::size_t j = 0; j < count_; ++j) {
+          sum += std::abs(start_.moved(i, k) * start_.inverse(i, j)) * first_[j];
+        }
+      }
+      rounding_ = std::max(rounding_, weights[k] * sum);
+      most = std::max(most, weights[k] * size_of(q, k));
+    }
+    rounding_ *= roundings * nodes_.gain() * std::numeric_limits<double>::epsilon();
+    rounding_ = std::min(rounding_, largest_rounding * most);
+  }
+
+  // What coordinates as large as these bring to a constraint.
+  double size(std::size_t which, const double* q) const {
+    double sum = 0;
+    for (std::size_t k = 0; k < coordinates_; ++k) sum += std::abs(start_.slope(which, k)) * size_of(q, k);
+    return sum;
+  }
+  double size_of(const double* q, std::size_t k) const {
+    return std::max(std::abs(q[k]), at_nodes_.model().info().is_angle[k] ? 1.0 : 0.0);
+  }
+
+  double slope(std::size_t node, std::size_t i, std::size_t k) const {
+    return node == 0 ? start_.slope(i, k) : slopes_[i * coordinates_ + k][node - 1];
+  }
+
+  // How constraints at the nodes respond to impulses at others, with the slopes that are predicted there, and the
+  // masses in the middle; inverted.
+  void find_inverse() {
+    const std::size_t stages = nodes_.stages(), all = count_ * stages, middle = stages / 2;
+    for (std::size_t k = 0; k < coordinates_; ++k) {
+      room_[k] = middle == 0 ? start_place_[k] : places_[k][middle - 1];
+    }
+    here_.set_time(time_ + h_ * nodes_.d(middle));
+    here_(&SystemFunctions::mass_matrix, room_.data(), masses_.matrix.data());
+    for (std::size_t m = 0; m < stages; ++m) {
+      for (std::size_t j = 0; j < count_; ++j) {
+        for (std::size_t k = 0; k < coordinates_; ++k) moved_[(m * count_ + j) * coordinates_ + k] = slope(m, j, k);
+      }
+    }
+    masses_.solve(moved_.data(), static_cast<Eigen::Index>(all));
+    for (std::size_t n = 0; n < stages; ++n) {
+      for (std::size_t i = 0; i < count_; ++i) {
+        for (std::size_t m = 0; m < stages; ++m) {
+          for (std::size_t j = 0; j < count_; ++j) {
+            const double* const moved = moved_.data() + (m * count_ + j) * coordinates_;
+            double sum = 0;
+            for (std::size_t k = 0; k < coordinates_; ++k) sum += slope(n + 1, i, k) * moved[k];
+            // Transposed: of the inverse, rows are asked for.
+            responses_.matrix(static_cast<Eigen::Index>(m * count_ + j), static_cast<Eigen::Index>(n * count_ + i)) =
+                nodes_.response(n, m) * sum;
+          }
+        }
+      }
+    }
+    std::fill(inverse_.begin(), inverse_.end(), 0.0);
+    for (std::size_t at = 0; at < all; ++at) inverse_[at * all + at] = 1;
+    responses_.solve(inverse_.data(), static_cast<Eigen::Index>(all));
+  }
+
+  // What impulses push, by slopes at the nodes.
+  void push() {
+    for (std::size_t k = 0; k < coordinates_; ++k) {
+      double* const pushed = pushes_[k];
+      std::fill_n(pushed, width, 0.0);
+      for (std::size_t i = 0; i < count_; ++i) {
+        const double* const slopes = slopes_[i * coordinates_ + k];
+        pushed[0] += start_.slope(i, k) * impulses_[i][0];
+        for (std::size_t node = 1; node < nodes_.stages(); ++node)
+          pushed[node] += slopes[node - 1] * impulses_[i][node];
+      }
+    }
+  }
+
+  void require(std::size_t which, const char* expected, double got, double size) const {
+    if (std::abs(got) <= kept * size || got == 0) return;
+    std::ostringstream text;
+    text << expected << " at the start, got " << got;
+    fail(which, text.str());
+  }
+  [[noreturn]] void fail(std::size_t which, const std::string& what) const {
+    throw std::invalid_argument("constraint " + std::string(at_nodes_.model().info().constraints[which]) +
+                                ": expected " + what);
+  }
+
+  static constexpr double roundings = 4;             // of a sum
+  static constexpr double largest_rounding = 1e-12;  // of coordinates, where constraints nearly depend on one another
+  static constexpr double kept = 1e-10;              // by a start, relative to what coordinates and rates are
+
+  LobattoNodes<Width> nodes_;
+  SystemAt<Width> at_nodes_;
+  SystemAt<1> here_;
+  ConstraintForces start_, end_;
+  std::size_t count_, coordinates_;
+  Rows impulses_;                 // h w λ at the nodes 0 … s − 1, of the last step that was tried
+  Rows pushes_;                   // what they push
+  Rows places_, still_;           // at the nodes 1 … s
+  Rows values_, slopes_, rates_;  // of the constraints there
+  std::vector<double> first_, last_, end_push_, room_, start_place_;
+  std::vector<double> lacking_, moved_, inverse_;
+  LinearSystem masses_, responses_;
+  double time_ = 0, h_ = 0, rounding_ = 0;
+};
+
+}  // namespace pendula

@@ -1,0 +1,93 @@
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <pendula/numeric/linear_system.hpp>
+#include <pendula/system/system_model.hpp>
+#include <vector>
+
+namespace pendula {
+
+/// Constraints g(q, t) = 0 of a system at one place, and forces Gᵀ λ, G = ∂g/∂q, by which they hold there:
+///   K λ = −(G a + d²g/dt² without accelerations),  K = G M⁻¹ Gᵀ,  a the accelerations without them.
+class ConstraintForces {
+ public:
+  explicit ConstraintForces(const SystemInfo& info)
+      : count_(info.constraints.size()),
+        coordinates_(info.coordinates.size()),
+        values_(count_),
+        slopes_(count_ * coordinates_),
+        moved_(slopes_),
+        inverse_(count_ * count_),
+        rates_(count_),
+        second_(count_),
+        masses_(static_cast<Eigen::Index>(coordinates_)),
+        softness_(static_cast<Eigen::Index>(count_)) {}
+
+  std::size_t count() const { return count_; }
+
+  /// Goes to q  (coordinates).
+  void look(const SystemAt<1>& here, const double* q) {
+    here(&SystemFunctions::constraints, q, values_.data(), slopes_.data());
+    here(&SystemFunctions::mass_matrix, q, masses_.matrix.data());  // it is symmetric
+    moved_ = slopes_;
+    masses_.solve(moved_.data(), static_cast<Eigen::Index>(count_));
+    for (std::size_t i = 0; i < count_; ++i) {
+      for (std::size_t j = 0; j < count_; ++j) {
+        double sum = 0;
+        for (std::size_t k = 0; k < coordinates_; ++k) sum += slope(i, k) * moved(j, k);
+        softness_.matrix(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j)) = sum;
+        inverse_[i * count_ + j] = i == j ? 1 : 0;
+      }
+    }
+    softness_.solve(inverse_.data(), static_cast<Eigen::Index>(count_));
+  }
+
+  /// g, ∂g/∂q, M⁻¹ (∂g/∂q)ᵀ, K⁻¹ there.
+  double value(std::size_t i) const { return values_[i]; }
+  double slope(std::size_t i, std::size_t k) const { return slopes_[i * coordinates_ + k]; }
+  double moved(std::size_t i, std::size_t k) const { return moved_[i * coordinates_ + k]; }
+  double inverse(std::size_t i, std::size_t j) const { return inverse_[i * count_ + j]; }
+
+  /// λ in the state q, v, where look was called.
+  void find(const SystemAt<1>& here, const double* q, const double* v, const double* a, double* lambda) {
+    here(&SystemFunctions::constraint_rates, q, v, rates_.data(), second_.data());
+    for (std::size_t i = 0; i < count_; ++i) {
+      for (std::size_t k = 0; k < coordinates_; ++k) second_[i] += slope(i, k) * a[k];
+    }
+    resist(second_, lambda);
+  }
+
+  /// Adds to accelerations or rates what λ, or impulses, bring.
+  void move(const double* lambda, double* rates) const {
+    for (std::size_t i = 0; i < count_; ++i) {
+      for (std::size_t k = 0; k < coordinates_; ++k) rates[k] += moved(i, k) * lambda[i];
+    }
+  }
+
+  /// Impulses that stop what of the rates v there breaks constraints.
+  void stop(const SystemAt<1>& here, const double* q, const double* v, double* impulses) {
+    here(&SystemFunctions::constraint_rates, q, v, rates_.data(), second_.data());
+    resist(rates_, impulses);
+  }
+  /// dg/dt in the state that stop was called with.
+  double rate(std::size_t i) const { return rates_[i]; }
+
+ private:
+  void resist(const std::vector<double>& changes, double* found) const {
+    for (std::size_t i = 0; i < count_; ++i) {
+      found[i] = 0;
+      for (std::size_t j = 0; j < count_; ++j) found[i] -= inverse(i, j) * changes[j];
+    }
+  }
+
+  std::size_t count_, coordinates_;
+  std::vector<double> values_, slopes_;
+  std::vector<double> moved_;    // M⁻¹ Gᵀ, constraint by constraint
+  std::vector<double> inverse_;  // of K
+  std::vector<double> rates_, second_;
+  LinearSystem masses_, softness_;
+};
+
+}  // namespace pendula
