@@ -1,6 +1,6 @@
 """Tries to find runs of pendula that are wrong without a word.
 
-usage: python tests/campaign/attack.py chains|models|events|ensembles|aimed --seed 1 --from 0 --count 1000
+usage: python tests/campaign/attack.py chains|models|events|ensembles|aimed|linkages --seed 1 --from 0 --count 1000
 
 Each number is a case (drawing.py). The program moves it, references that it has no part in do too (truth.py), and each
 row and event that it writes is compared (judging.py says what is right). What is silently wrong is kept, to be run
@@ -8,7 +8,7 @@ again, in FOLDER/silent/CASE. Verdicts are lines of FOLDER/verdicts_KIND_SEED.js
 again, but with --again. References are kept in FOLDER/truths. Ends with exit status 1 where a case is silently wrong,
 or the program crashed.
 
-The compiled references need chain_reference and model_reference, Python needs SymPy, NumPy and h5py.
+The compiled references need chain_reference, model_reference and linkage_reference, Python needs SymPy, NumPy and h5py.
 """
 
 import argparse
@@ -114,10 +114,15 @@ def main() -> None:
     numbers = given.only if given.only else range(given.first, given.first + given.count)
     given.folder = given.folder.resolve()
     given.folder.mkdir(parents=True, exist_ok=True)
-    references = [(given.references / name).resolve() for name in ("chain_reference", "model_reference")]
+    references = [
+        (given.references / name).resolve()
+        for name in ("chain_reference", "model_reference", "linkage_reference")
+    ]
     for file in (given.program, *references):
         if not os.access(file, os.X_OK):
-            words.error(f"{file} is no program; build pendula_cli, chain_reference and model_reference")
+            words.error(
+                f"{file} is no program; build pendula_cli, chain_reference, model_reference and linkage_reference"
+            )
     kept = given.folder / "truths"
     kept.mkdir(exist_ok=True)
     room = truth.Room(*references, kept)

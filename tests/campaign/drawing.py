@@ -14,10 +14,11 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import aimed
+import linkages
 import model_drawing
 from random_chains import Draw
 
-FIRST = {"chains": 1000, "models": 400, "events": 3000, "ensembles": 300, "aimed": 400}
+FIRST = {"chains": 1000, "models": 400, "events": 3000, "ensembles": 300, "aimed": 400, "linkages": 200}
 KINDS = tuple(FIRST)
 BROUGHT = Path(__file__).parents[2] / "codegen" / "pendula_codegen" / "models"
 
@@ -43,7 +44,7 @@ class Case:
     """tables: the scenario. model: the text of model.py. narrow: (expression, width) of what is narrow in it.
     levels: for each event, the numbers that stand as {0}, {1} in `when`. around: for each event, expressions beside
     whose zeros `when` changes quickly. resumed: the part of the duration after which the run ends, and goes on; 0 for
-    none."""
+    none. linkage: what is moved, where the reference is that of linkages."""
 
     kind: str
     seed: int
@@ -55,6 +56,7 @@ class Case:
     levels: list[list[Level]] = field(default_factory=list)
     around: list[list[str]] = field(default_factory=list)
     resumed: float = 0.0
+    linkage: linkages.Linkage | None = None
 
     @property
     def name(self) -> str:
@@ -68,12 +70,18 @@ def draw(kind: str, seed: int, number: int) -> Case:
         "events": an_event,
         "ensembles": an_ensemble,
         "aimed": an_aimed_one,
+        "linkages": a_linkage,
     }[kind](seed, number)
 
 
 def an_aimed_one(seed: int, number: int) -> Case:
     family, tables, text, narrow = aimed.draw(seed, number)
     return Case("aimed", seed, number, family, tables, text, narrow)
+
+
+def a_linkage(seed: int, number: int) -> Case:
+    family, tables, text, linkage = linkages.draw(seed, number)
+    return Case("linkages", seed, number, family, tables, text, linkage=linkage)
 
 
 # --- how a run is moved, and what is written of it

@@ -26,6 +26,7 @@ from pathlib import Path
 
 import aimed
 import crossings
+import linkages
 import numpy as np
 import truth
 from drawing import Case, Level
@@ -120,6 +121,8 @@ def settings_of(run: dict) -> str:
 
 def subject_of(case: Case, room: truth.Room, tables: dict | None = None) -> truth.Subject:
     tables = tables or case.tables
+    if case.linkage is not None:
+        return linkages.LinkageSubject(room, case.linkage)
     if "chain" in tables:
         return truth.ChainSubject(room, tables)
     if case.family in aimed.MOTIONS:

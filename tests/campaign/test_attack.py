@@ -10,6 +10,7 @@ import aimed
 import crossings
 import drawing
 import judging
+import linkages
 import model_equations
 import numpy as np
 import pytest
@@ -30,7 +31,7 @@ def define(model, links):
 @pytest.fixture
 def room(tmp_path) -> truth.Room:
     references = []
-    for name in ("CHAIN_REFERENCE", "MODEL_REFERENCE"):
+    for name in ("CHAIN_REFERENCE", "MODEL_REFERENCE", "LINKAGE_REFERENCE"):
         assert os.environ.get(name), f"{name} must name the compiled reference"
         references.append(Path(os.environ[name]))
     return truth.Room(*references, tmp_path / "truths")
@@ -169,6 +170,34 @@ def test_the_equations_are_those_of_the_chain(room):
     ours, theirs = (truth.rows_at(subject, [1.0, 2.0], 2.0).columns for subject in (model, chain))
     for name in ("theta_1", "theta_2"):
         assert np.abs(ours[name] - theirs[name]).max() < 1e-12  # measured 3e-16
+
+
+def test_a_linkage_without_loops_is_the_chain(room):
+    """Bars and multipliers in Cartesian coordinates against tensions along rods."""
+    angles, rates, masses, lengths = (1.0, -2.0), (0.5, 0.2), (1.5, 0.7), (0.7, 1.1)
+    chain = truth.ChainSubject(
+        room,
+        {
+            "chain": {"space": "planar", "links": 2, "masses": list(masses), "lengths": list(lengths)},
+            "start": {"theta": list(angles), "theta_dot": list(rates)},
+            "run": {"duration": 2.0},
+        },
+    )
+    at, speed, places, velocities = np.zeros(2), np.zeros(2), [], []
+    for length, angle, rate in zip(lengths, angles, rates, strict=True):
+        at = at + np.array([length * math.sin(angle), -length * math.cos(angle)])
+        speed = speed + length * rate * np.array([math.cos(angle), math.sin(angle)])
+        places.append(at.tolist())
+        velocities.append(speed.tolist())
+    bars = [(2, 0, lengths[0] ** 2), (0, 1, lengths[1] ** 2)]
+    hook = linkages.fixed(0.0, 0.0)
+    linkage = linkages.Linkage(2, list(masses), 0.0, 9.81, [hook], bars, [], places, velocities)
+    ours, theirs = (
+        truth.rows_at(subject, [1.0, 2.0], 2.0).columns
+        for subject in (linkages.LinkageSubject(room, linkage), chain)
+    )
+    for name in ("x_1", "y_1", "x_2", "y_2"):
+        assert np.abs(ours[name] - theirs[name]).max() < 1e-13, name  # measured WW
 
 
 def test_a_dense_motion_is_the_motion(room):

@@ -41,7 +41,9 @@ ALL = [
 
 @pytest.fixture(scope="session")
 def room(tmp_path_factory) -> truth.Room:
-    references = [Path(os.environ[name]) for name in ("CHAIN_REFERENCE", "MODEL_REFERENCE")]
+    references = [
+        Path(os.environ[name]) for name in ("CHAIN_REFERENCE", "MODEL_REFERENCE", "LINKAGE_REFERENCE")
+    ]
     return truth.Room(*references, tmp_path_factory.mktemp("truths"))
 
 

@@ -33,6 +33,7 @@ class Room:
 
     chain_reference: Path
     model_reference: Path
+    linkage_reference: Path
     kept: Path
 
     def rows(self, command: list, numbers: str, width: int) -> np.ndarray:
