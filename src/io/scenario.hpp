@@ -58,6 +58,7 @@ struct Scenario : RunPlan {
 struct SystemScenario : RunPlan {
   std::shared_ptr<const SystemSubject> system;
   Motion start;
+  std::vector<std::pair<std::string, double>> assembled;  ///< coordinates and rates that constraints gave
 };
 
 using AnyScenario = std::variant<Scenario<Planar>, Scenario<Spatial>, SystemScenario>;

@@ -66,7 +66,14 @@ std::string what_was_moved(const ModelSummary& model) {
       numbers += ", " + name + " " + rounded(values.front());
       if (std::ranges::adjacent_find(values, std::not_equal_to()) != values.end()) numbers += " ...";
     }
-    return line("system", model.model + (model.links > 1 ? ", " + plural(model.links, "link") : "") + numbers);
+    std::string text =
+        line("system", model.model + (model.links > 1 ? ", " + plural(model.links, "link") : "") + numbers);
+    if (model.constraints > 0) {
+      text += line("constraints", std::to_string(model.constraints),
+                   plural(model.degrees_of_freedom, "degree") + " of freedom");
+    }
+    for (const auto& [name, value] : model.assembled) text += line(name, rounded(value), "found for the start");
+    return text;
   }
   const UnitNames unit = unit_names(model.natural);
   const std::string acceleration = model.natural ? " g" : " m/s^2";
@@ -147,6 +154,10 @@ std::string statistics(const Summary& summary) {
   if (has_stages(summary)) {
     text += line("iterations", std::to_string(counts.newton_iterations),
                  rounded(a_step(static_cast<double>(counts.newton_iterations)), 4) + " a step");
+    if (summary.model.constraints > 0) {
+      text += line("constraint error", rounded(counts.constraint_error, 2),
+                   "rates " + rounded(counts.constraint_rate_error, 2));
+    }
   }
   return text + line("stepping time", duration_text(summary.stepping_seconds),
                      duration_text(a_step(summary.stepping_seconds)) + " a step");
@@ -268,6 +279,8 @@ ModelSummary model_summary(const std::string& scenario, const SystemSubject& sys
   model.model = info.model;
   model.links = info.links;
   model.loaded = system.loaded();
+  model.constraints = static_cast<int>(info.constraints.size());
+  model.degrees_of_freedom = static_cast<int>(info.coordinates.size()) - model.constraints;
   auto next = system.numbers().parameters.begin();
   for (std::size_t k = 0; k < info.own_parameters(); ++k) {
     const auto end = next + info.parameter_sizes[k];

@@ -105,6 +105,12 @@ Json to_json(const Ending& ending) {
   return json;
 }
 
+Json constraint_errors(const Summary& summary) {
+  const Statistics& of = summary.statistics;
+  return where(summary.model.constraints > 0,
+               Json{{"position", of.constraint_error}, {"rate", of.constraint_rate_error}});
+}
+
 /// A time; null if the event never happened.
 Json events_json(const Summary& summary) {
   Json json = Json::array();
@@ -126,6 +132,9 @@ constexpr std::string_view natural_schema =
     R"({"type": ["object", "null"], "required": ["length", "mass", "time"], "additionalProperties": {"type": "number"}})";
 constexpr std::string_view parameters_schema =
     R"({"type": "object", "additionalProperties": {"type": "array", "items": {"type": "number"}}})";
+constexpr std::string_view numbers_schema = R"({"type": "object", "additionalProperties": {"type": "number"}})";
+constexpr std::string_view constraint_schema = R"({"type": ["object", "null"], "required": ["position", "rate"],
+  "properties": {"position": {"type": "number"}, "rate": {"type": "number"}}, "additionalProperties": false})";
 constexpr std::string_view outcome_schema = R"({"type": "object", "required": ["status"],
   "properties": {
     "status": {"enum": ["ok", "stopped_by_event", "not_converged", "wrong_root", "tolerance_not_met", "not_finite",
@@ -157,7 +166,7 @@ constexpr std::array<std::string_view, 2> chain_spaces = {Planar::name, Spatial:
 constexpr SummaryScope anything = SummaryScope::anything, chains = SummaryScope::chains,
                        systems = SummaryScope::systems;
 
-constexpr std::array<JsonRow, 43> rows = {{
+constexpr std::array<JsonRow, 46> rows = {{
     {{"pendula", "string", "version"}, [](const Summary&) { return Json(version); }},
     {{"scenario", "string", "file, as it was named"}, [](const Summary& s) { return Json(s.model.scenario); }},
     {{"space", "string", "planar or spatial", "", chains, chain_spaces},
@@ -170,6 +179,13 @@ constexpr std::array<JsonRow, 43> rows = {{
      [](const Summary& s) { return to_json(s.model.natural); }},
     {{"parameters", parameters_schema, "of the model, by name", "", systems},
      [](const Summary& s) { return named(s.model.parameters); }},
+    {{"degrees_of_freedom", "integer", "coordinates less constraints", "", systems},
+     [](const Summary& s) { return Json(s.model.degrees_of_freedom); }},
+    {{"assembled", numbers_schema, "coordinates and rates of the start that constraints gave", "", systems},
+     [](const Summary& s) { return named(s.model.assembled); }},
+    {{"constraint_error", constraint_schema, "largest after a step, each in its unit; null without constraints", "",
+      systems},
+     [](const Summary& s) { return constraint_errors(s); }},
     {{"feedback", texts_schema, "inputs that have some"}, [](const Summary& s) { return Json(s.model.feedback); }},
     {{"signals", texts_schema, "inputs that follow some"}, [](const Summary& s) { return Json(s.model.signals); }},
     {{"method", "string", "that moved it", "", anything, names_of<Method>},

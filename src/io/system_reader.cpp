@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <numbers>
 #include <pendula/numeric/number_text.hpp>
+#include <pendula/run/assembly.hpp>
 #include <pendula/run/library.hpp>
 #include <set>
 
@@ -87,6 +88,7 @@ class StartTable {
         known.insert({stem, rate_name(stem), momentum_of(stem)});
       }
     }
+    if (!info.constraints.empty()) known.insert(std::string(assemble_key));
     names_.assign(known.begin(), known.end());
     keys_.resize(names_.size());
     for (std::size_t k = 0; k < keys_.size(); ++k) keys_[k].name = names_[k];
@@ -110,6 +112,20 @@ class StartTable {
   std::optional<Entry> first_rate() const { return first(rate_name); }
   const std::string& where() const { return table_->where(); }
 
+  /// Which coordinates and rates constraints are met by: those that it lists, or else those that it does not give.
+  FreeNumbers free() const {
+    const std::size_t count = info_.coordinates.size();
+    if (const std::optional<Entry> list = table_->find(assemble_key)) return listed_in(*list);
+    FreeNumbers free{std::vector<bool>(count), std::vector<bool>(count)};
+    for (std::size_t k = 0; k < count; ++k) {
+      const std::string own(info_.coordinates[k]), stem(family(own));
+      const auto is_given = [&](auto name) { return find(name, own) || (!stem.empty() && find(name, stem)); };
+      free.coordinates[k] = !is_given([](std::string_view name) { return std::string(name); });
+      free.rates[k] = !is_given([](std::string_view name) { return rate_name(name); }) && !first_momentum();
+    }
+    return free;
+  }
+
   /// The entry of coordinate k: its own, or that of its array.
   std::optional<Entry> entry_of(std::size_t k) const {
     if (const auto own = table_->find(info_.coordinates[k])) return own;
@@ -118,6 +134,24 @@ class StartTable {
   }
 
  private:
+  FreeNumbers listed_in(const Entry& list) const {
+    const std::size_t count = info_.coordinates.size();
+    FreeNumbers free{std::vector<bool>(count), std::vector<bool>(count)};
+    if (!list.is_array()) list.fail("names of coordinates and rates");
+    for (std::size_t k = 0; k < list.size(); ++k) {
+      const Entry name = list.element(k);
+      bool is_known = false;
+      for (std::size_t i = 0; i < count; ++i) {
+        if (name.text() == info_.coordinates[i]) free.coordinates[i] = is_known = true;
+        if (name.text() == rate_name(info_.coordinates[i])) free.rates[i] = is_known = true;
+      }
+      if (!is_known) name.fail("a coordinate or a rate of the model");
+    }
+    return free;
+  }
+
+  static constexpr std::string_view assemble_key = "assemble";
+
   static std::string momentum_of(std::string_view stem) { return std::string("p_").append(stem); }
 
   /// Rates may also have their older names.
@@ -187,15 +221,34 @@ void require_inertia(const StartTable& table, const SystemSubject& system, const
   throw InputError(table.where(), "start", "coordinates where the mass matrix is not singular", got);
 }
 
-Motion read_start(const Section& root, const SystemSubject& system) {
+/// Puts a start on the constraints; returns what was found, by name.
+std::vector<std::pair<std::string, double>> put_together(const StartTable& table, const SystemSubject& system,
+                                                         Motion& start) {
+  std::vector<std::pair<std::string, double>> found;
+  const SystemInfo& info = system.info();
+  if (info.constraints.empty()) return found;
+  const FreeNumbers free = table.free();
+  if (const std::string left = assemble(system, free, start); !left.empty()) {
+    throw InputError(table.where(), "start", "coordinates and rates that keep the constraints", left + " left over");
+  }
+  for (std::size_t k = 0; k < info.coordinates.size(); ++k) {
+    if (free.coordinates[k]) found.emplace_back(info.coordinates[k], start.q[static_cast<Eigen::Index>(k)]);
+  }
+  for (std::size_t k = 0; k < info.coordinates.size(); ++k) {
+    if (free.rates[k]) found.emplace_back(rate_name(info.coordinates[k]), start.v[static_cast<Eigen::Index>(k)]);
+  }
+  return found;
+}
+
+void read_start(const Section& root, const SystemSubject& system, SystemScenario& scenario) {
   const StartTable table(root, system.info());
-  Motion start(0, table.positions(), table.rates());
+  Motion& start = scenario.start = Motion(0, table.positions(), table.rates());
   require_inertia(table, system, start.q);
   if (const std::optional<Entry> momentum = table.first_momentum()) {
     if (const auto rate = table.first_rate()) rate->fail("no rates beside the momenta " + momentum->name());
     start.v = system.rates(0, start.q, table.momenta());
   }
-  return start;
+  scenario.assembled = put_together(table, system, start);
 }
 
 /// Warnings of angles that were probably meant in degrees, one for each key.
@@ -278,7 +331,7 @@ SystemScenario read_system(const Section& root, const std::filesystem::path& fol
   } catch (const ModelError& error) {
     throw InputError(place_of(error.what(), drives, model) + ": " + error.what());
   }
-  scenario.start = read_start(root, *scenario.system);
+  read_start(root, *scenario.system, scenario);
   scenario.warnings = degree_warnings(root, scenario.system->info());
   return scenario;
 }

@@ -1,0 +1,151 @@
+#include <Eigen/Core>
+#include <Eigen/QR>
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <pendula/numeric/number_text.hpp>
+#include <pendula/run/assembly.hpp>
+#include <pendula/system/system_model.hpp>
+
+namespace pendula {
+namespace {
+
+using Matrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+
+class Assembly {
+ public:
+  Assembly(const SystemSubject& system, Motion& start)
+      : info_(system.info()),
+        here_(SystemModel(system.table(), system.numbers().plain())),
+        start_(start),
+        values_(std::ssize(info_.constraints)),
+        second_(values_.size()),
+        slopes_(values_.size(), start.q.size()) {
+    here_.set_time(start.time);
+  }
+
+  /// Newton's iteration with the least change of free coordinates; shorter where constraints would get worse.
+  std::string place(const std::vector<bool>& free) {
+    constexpr int most = 100;
+    Eigen::VectorXd change = Eigen::VectorXd::Zero(start_.q.size());
+    look(start_.q);
+    double left = lacking();
+    for (int correction = 0; correction < most && left > rounding; ++correction) {
+      put(free, least(chosen(slopes_, free), -values_), change);
+      const Eigen::VectorXd before = start_.q;
+      const double was = left;
+      for (double part = 1; part > shortest; part /= 2) {
+        look(before + part * change);
+        left = lacking();
+        if (left < was) {
+          start_.q = before + part * change;
+          break;
+        }
+      }
+      if (!(left < was)) break;  // it stays where it was
+    }
+    look(start_.q);
+    return lacking() <= enough ? "" : left_over("", values_);
+  }
+
+  /// Minimises ½ vᵀ M v where (∂g/∂q) v + ∂g/∂t = 0.
+  std::string move(const std::vector<bool>& free) {
+    Matrix mass(start_.q.size(), start_.q.size());
+    here_(&SystemFunctions::mass_matrix, start_.q.data(), mass.data());
+    Eigen::VectorXd kept = start_.v;
+    for (Eigen::Index k = 0; k < kept.size(); ++k) {
+      if (free[static_cast<std::size_t>(k)]) kept[k] = 0;
+    }
+    const Eigen::VectorXd rates = rates_of(kept);
+    const Matrix slopes = chosen(slopes_, free);
+    const Eigen::Index count = slopes.cols(), all = count + slopes.rows();
+    Matrix equations = Matrix::Zero(all, all);
+    Eigen::VectorXd right(all);
+    equations.topLeftCorner(count, count) = chosen(Matrix(chosen(mass, free).transpose()), free);
+    equations.topRightCorner(count, slopes.rows()) = slopes.transpose();
+    equations.bottomLeftCorner(slopes.rows(), count) = slopes;
+    right.head(count) = -chosen(mass, free).transpose() * kept;
+    right.tail(slopes.rows()) = -rates;
+    put(free, least(equations, right).head(count), kept);
+    start_.v = kept;
+    const Eigen::VectorXd left = rates_of(kept);
+    for (Eigen::Index i = 0; i < left.size(); ++i) {
+      const double size = (slopes_.row(i).transpose().cwiseProduct(kept)).cwiseAbs().sum();
+      if (!(std::abs(left[i]) <= enough * size) && left[i] != 0) return left_over("rate of ", left);
+    }
+    return "";
+  }
+
+ private:
+  static constexpr double rounding = 1e-15, enough = 1e-11, shortest = 1e-6;
+
+  void look(const Eigen::VectorXd& q) {
+    here_(&SystemFunctions::constraints, q.data(), values_.data(), slopes_.data());
+  }
+  Eigen::VectorXd rates_of(const Eigen::VectorXd& v) {
+    Eigen::VectorXd rates(values_.size());
+    here_(&SystemFunctions::constraint_rates, start_.q.data(), v.data(), rates.data(), second_.data());
+    return rates;
+  }
+
+  /// The largest value of a constraint, relative to what coordinates as large as these bring.
+  double lacking() const {
+    double most = 0;
+    for (Eigen::Index i = 0; i < values_.size(); ++i) {
+      double size = 0;
+      for (Eigen::Index k = 0; k < start_.q.size(); ++k) {
+        const double angle = info_.is_angle[static_cast<std::size_t>(k)] ? 1 : 0;
+        size += std::abs(slopes_(i, k)) * std::max(std::abs(start_.q[k]), angle);
+      }
+      const double left = std::abs(values_[i]);
+      if (left != 0 || std::isnan(size)) most = std::max(most, size > 0 ? left / size : 1.0);
+      if (std::isnan(left)) return left;
+    }
+    return most;
+  }
+
+  static Matrix chosen(const Matrix& of, const std::vector<bool>& free) {
+    Matrix columns(of.rows(), std::count(free.begin(), free.end(), true));
+    Eigen::Index next = 0;
+    for (Eigen::Index k = 0; k < of.cols(); ++k) {
+      if (free[static_cast<std::size_t>(k)]) columns.col(next++) = of.col(k);
+    }
+    return columns;
+  }
+  static void put(const std::vector<bool>& free, const Eigen::VectorXd& numbers, Eigen::VectorXd& to) {
+    Eigen::Index next = 0;
+    for (Eigen::Index k = 0; k < to.size(); ++k) {
+      if (free[static_cast<std::size_t>(k)]) to[k] = numbers[next++];
+    }
+  }
+  static Eigen::VectorXd least(const Matrix& equations, const Eigen::VectorXd& right) {
+    if (equations.cols() == 0) return {};
+    return Eigen::CompleteOrthogonalDecomposition<Eigen::MatrixXd>(equations).solve(right);
+  }
+
+  std::string left_over(const std::string& what, const Eigen::VectorXd& left) const {
+    std::string text;
+    for (Eigen::Index i = 0; i < left.size(); ++i) {
+      const auto k = static_cast<std::size_t>(i);
+      text += (text.empty() ? "" : ", ") + rounded(left[i], 3) + " " + std::string(info_.constraint_units[k]) +
+              (what.empty() ? "" : "/s") + " in the " + what + std::string(info_.constraints[k]);
+    }
+    return text;
+  }
+
+  const SystemInfo& info_;
+  SystemAt<1> here_;
+  Motion& start_;
+  Eigen::VectorXd values_, second_;
+  Matrix slopes_;
+};
+
+}  // namespace
+
+std::string assemble(const SystemSubject& system, const FreeNumbers& free, Motion& start) {
+  Assembly assembly(system, start);
+  std::string left = assembly.place(free.coordinates);
+  return left.empty() ? assembly.move(free.rates) : left;
+}
+
+}  // namespace pendula

@@ -1,0 +1,239 @@
+"""Models with constraints: order, what holds at rounding, energy, starts, and truths that no solver of ours gave."""
+
+import csv
+import json
+import math
+
+import pytest
+
+# Uprights and couplers of N four-bars side by side, slender rods of 1 m and 1 kg; one freedom (IFToMM A02).
+FOUR_BARS = """
+from sympy import cos, sin
+
+
+def define(model, links):
+    g = model.parameter("g", "m/s^2", default=9.81)
+    L, tips = 0, []
+    for k in range(links + 1):
+        phi = model.coordinate(f"phi_{k}", "rad")
+        L += model.rate(phi) ** 2 / 6 - g * cos(phi) / 2
+        tips.append((k + sin(phi), cos(phi)))
+    model.point("tip", tips[0])
+    for k in range(1, links + 1):
+        psi = model.coordinate(f"psi_{k}", "rad")
+        (ax, ay), (bx, by) = tips[k - 1], tips[k]
+        mx, my = ax + cos(psi) / 2, ay + sin(psi) / 2
+        L += (model.rate(mx) ** 2 + model.rate(my) ** 2) / 2 + model.rate(psi) ** 2 / 24 - g * my
+        model.constraint(f"x_{k}", ax + cos(psi) - bx, "m")
+        model.constraint(f"y_{k}", ay + sin(psi) - by, "m")
+    model.lagrangian = L
+"""
+FOUR_BARS_START = """
+phi_0 = 0
+phi_dot_0 = 1
+assemble = ["phi_1", "phi_2", "psi_1", "psi_2", "phi_dot_1", "phi_dot_2", "psi_dot_1", "psi_dot_2"]
+"""
+# Of three bars in angles.
+ANGLES = """
+from sympy import cos, sin
+
+
+def define(model, links):
+    g, x, y, L = model.parameter("g", "m/s^2", default=9.81), 0, 0, 0
+    for k, (length, mass, share) in enumerate([(1.0, 1.0, 1), (1.5, 2.0, 1), (1.2, 0.3, 0.5)], start=1):
+        angle = model.coordinate(f"theta_{k}", "rad")
+        bob = x + share * length * sin(angle), y - share * length * cos(angle)
+        L += mass * (model.rate(bob[0]) ** 2 + model.rate(bob[1]) ** 2) / 2 - mass * g * bob[1]
+        x, y = x + length * sin(angle), y - length * cos(angle)
+    model.lagrangian = L
+    model.constraint("loop_x", x - 1.6, "m")
+    model.constraint("loop_y", y, "m")
+"""
+ANGLES_START = """
+theta_1 = 1.1
+theta_2 = 1.9
+theta_3 = 2.9
+assemble = ["theta_2", "theta_3"]
+"""
+# The same kind, of bobs in Cartesian coordinates.
+BOBS = """
+def define(model, links):
+    g, d = model.parameter("g", "m/s^2", default=9.81), 1.6
+    (a, b), (p, q) = ([model.coordinate(f"{axis}_{k}", "m") for axis in "xy"] for k in (1, 2))
+    kinetic = model.rate(a) ** 2 / 2 + model.rate(b) ** 2 / 2 + model.rate(p) ** 2 + model.rate(q) ** 2
+    model.lagrangian = kinetic - g * (b + 2 * q)
+    model.constraint("crank", (a**2 + b**2 - 1) / 2, "m^2")
+    model.constraint("coupler", ((p - a) ** 2 + (q - b) ** 2 - 1.5**2) / 2, "m^2")
+    model.constraint("rocker", ((d - p) ** 2 + q**2 - 1.2**2) / 2, "m^2")
+"""
+BOBS_START = """
+x_1 = 0.89
+y_1 = -0.45
+x_2 = 2.2
+y_2 = -1.0
+assemble = ["x_1", "y_1", "x_2", "y_2"]
+"""
+SLIDER = """
+from sympy import cos, sin
+
+
+def define(model, links):
+    a, b, s = model.coordinate("crank", "rad"), model.coordinate("rod", "rad"), model.coordinate("s", "m")
+    l, r = model.parameter("l", "m", default=2.0), model.parameter("r", "m", default=0.5)
+    va, vb, vs = map(model.rate, (a, b, s))
+    px, py = r * cos(a) + l / 2 * cos(b), r * sin(a) - l / 2 * sin(b)
+    model.lagrangian = 0.3 * va**2 / 2 + (model.rate(px) ** 2 + model.rate(py) ** 2) / 2 + l**2 / 24 * vb**2
+    model.lagrangian += 0.5 * vs**2 - 9.81 * (py + sin(a) / 2)
+    model.constraint("across", r * sin(a) - l * sin(b), "m")
+    model.constraint("along", r * cos(a) + l * cos(b) - s, "m")
+"""
+SLIDER_START = """
+crank = 0.4
+crank_dot = 5.0
+rod = 0.1
+s = 2.4
+assemble = ["rod", "s", "rod_dot", "s_dot"]
+"""
+ROD = """
+def define(model, links):
+    x, y = model.coordinate("x", "m"), model.coordinate("y", "m")
+    model.lagrangian = (model.rate(x) ** 2 + model.rate(y) ** 2) - 2 * 9.81 * y
+    model.constraint("rod", (x**2 + y**2 - 0.64) / 2, "m^2")
+"""
+# Two masses on a moving axle between springs, from the Test Set for IVP Solvers.
+CAR_AXIS = """
+from sympy import sin, sqrt
+
+
+def define(model, links):
+    xl, yl, xr, yr = (model.coordinate(name, "m") for name in ("x_l", "y_l", "x_r", "y_r"))
+    yb = sin(10 * model.time) / 10
+    xb = sqrt(1 - yb**2)
+    L = 5e-4 * sum(model.rate(c) ** 2 for c in (xl, yl, xr, yr)) / 2 - 5e-4 * (yl + yr)
+    L -= (sqrt(xl**2 + yl**2) - 0.5) ** 2 / 2 + (sqrt((xr - xb) ** 2 + (yr - yb) ** 2) - 0.5) ** 2 / 2
+    model.lagrangian = L
+    model.constraint("right_angle", xl * xb + yl * yb, "m^2")
+    model.constraint("axle", (xl - xr) ** 2 + (yl - yr) ** 2 - 1, "m^2")
+"""
+CAR_AXIS_START = """
+x_l = 0
+y_l = 0.5
+x_r = 1
+y_r = 0.5
+x_dot_l = -0.5
+y_dot_l = 0
+x_dot_r = -0.5
+y_dot_r = 0
+"""
+LINKAGES = {"angles": (ANGLES, ANGLES_START), "bobs": (BOBS, BOBS_START), "slider": (SLIDER, SLIDER_START)}
+
+
+@pytest.fixture
+def scenario(tmp_path):
+    """scenario(model, start, more of [system]) -> its file."""
+
+    def write(model, start, more=""):
+        (tmp_path / "linkage.py").write_text(model)
+        file = tmp_path / "linkage.toml"
+        file.write_text(
+            f'[system]\nmodel = "linkage.py"\n{more}\n[start]\n{start}\n[run]\nduration = 2.0\nstep = 0.01\n'
+        )
+        return file
+
+    return write
+
+
+def last(summary) -> list[float]:
+    return [*summary["final"]["q"].values(), *summary["final"]["v"].values()]
+
+
+def off(summary, truth) -> float:
+    return max(abs(x - y) for x, y in zip(last(summary), truth, strict=True))
+
+
+@pytest.mark.parametrize("name", LINKAGES)
+def test_order_is_twice_the_number_of_stages(name, scenario, simulate):
+    file = scenario(*LINKAGES[name])
+    truth = last(simulate(file, run__stages=6, run__step=1 / 256))
+    for stages, steps in ((1, (32, 64, 128)), (2, (32, 64, 128)), (3, (16, 32, 64)), (4, (16, 24, 32))):
+        runs = [simulate(file, run__stages=stages, run__step=1 / n) for n in steps]
+        errors = [off(run, truth) for run in runs]
+        order = math.log(errors[0] / errors[-1]) / math.log(steps[-1] / steps[0])
+        assert abs(order - 2 * stages) < 0.5, (stages, errors)
+        for run in runs:
+            assert max(run["constraint_error"].values()) < 1e-13, (stages, run["constraint_error"])
+
+
+def test_energy_does_not_drift(scenario, rows):
+    file = scenario(ANGLES, ANGLES_START)
+    energy = rows(file, run__stages=3, run__step=0.02, run__duration=200)["energy"]
+    first, end = (max(abs(h - energy[0]) for h in part) for part in (energy[:1000], energy[-1000:]))
+    assert 0 < end < 1.2 * first, (first, end)
+
+
+def test_a_rod_as_constraint_is_a_pendulum(scenario, simulate, tmp_path):
+    file = scenario(ROD, "x = 0.8\ny = 0")
+    chain = tmp_path / "chain.toml"
+    chain.write_text(
+        "[chain]\nmasses = [2.0]\nlengths = [0.8]\n[start]\ntheta = [1.5707963267948966]\n"
+        "[run]\nduration = 2.0\nstep = 0.01\nstages = 6\n"
+    )
+    angle = simulate(chain, run__step=0.005)["final"]["q"]["theta_1"]
+    found = simulate(file, run__stages=6)["final"]["q"]
+    assert abs(found["x"] - 0.8 * math.sin(angle)) < 1e-12
+    assert abs(found["y"] + 0.8 * math.cos(angle)) < 1e-12
+
+
+def test_four_bars_pass_their_singular_positions(scenario, simulate):
+    """Where all bars are level, the couplers could turn either way."""
+    file = scenario(FOUR_BARS, FOUR_BARS_START, "links = 2")
+    run = simulate(file, run__stages=4, run__step=0.01, run__duration=10)
+    x, y = run["final"]["points"]["tip"]
+    assert max(abs(x - 0.328458111540815379), abs(y - 0.944518538178600962)) < 1e-9
+    assert run["degrees_of_freedom"] == 1
+
+
+def test_constraints_may_move(scenario, simulate):
+    file = scenario(CAR_AXIS, CAR_AXIS_START)
+    found = simulate(file, run__stages=4, run__step=0.005, run__duration=3)["final"]
+    q, v = found["q"], found["v"]
+    assert abs(q["x_l"] - 0.0493455784275) < 1e-9
+    assert abs(q["x_r"] - 1.0417425248854) < 1e-9
+    assert abs(v["y_r"] - 0.770341043780) < 1e-8
+
+
+def test_forces_are_columns(scenario, rows):
+    """The pull in the rod of a pendulum: λ r = m (v²/r + g cos θ), and the constraint's slope is r."""
+    found = rows(scenario(ROD, "x = 0.8\ny = 0"))
+    for x, y, u, w, force in zip(*(found[n] for n in ("x", "y", "x_dot", "y_dot", "force_rod")), strict=True):
+        assert abs(-force - 2 * (u * u + w * w - 9.81 * y) / 0.64) < 1e-11
+        assert abs(x * x + y * y - 0.64) < 1e-14
+
+
+STARTS = {
+    'theta_1 = 1.1\ntheta_2 = 1.9\ntheta_3 = 2.9\nassemble = ["theta_3"]': "left over",
+    "theta_1 = 1.1\ntheta_2 = 1.2\ntheta_3 = 3.7\ntheta_dot_1 = 1": "left over",
+    'theta_1 = 1.1\nassemble = ["theta_4"]': "expected a coordinate or a rate of the model",
+}
+
+
+@pytest.mark.parametrize(("start", "told"), STARTS.items())
+def test_starts_that_cannot_be_put_together(start, told, scenario, pendula):
+    ended = pendula("simulate", scenario(ANGLES, start))
+    assert ended.returncode == 2
+    assert told in ended.stderr
+
+
+REFUSED = {
+    "run.method": ("rk4", "method: expected gauss, got rk4, for a system with constraints"),
+    "run.iteration": ("newton", "iteration: expected fixed-point, got newton, for a system with constraints"),
+    "run.form": ("velocity", "form: expected momentum, got velocity, for a system with constraints"),
+}
+
+
+@pytest.mark.parametrize("key", REFUSED)
+def test_what_cannot_keep_constraints(key, scenario, pendula):
+    value, told = REFUSED[key]
+    ended = pendula("simulate", scenario(ANGLES, ANGLES_START), f"--set={key}={value}")
+    assert ended.returncode == 2
+    assert told in ended.stderr
