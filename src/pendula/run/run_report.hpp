@@ -35,8 +35,9 @@ struct RunRequest {
 struct RunSetup : RunRequest {
   std::shared_ptr<const Subject> subject;
   Motion start;
-  bool judged = true;              ///< whether to look for reasons not to trust the result
-  std::vector<Event> events = {};  ///< to find
+  bool judged = true;  ///< whether to look for reasons not to trust the result
+  /// To find.
+  std::vector<Event> events = {};  // NOLINT(readability-redundant-member-init): left out in initializers
   double motion_tolerance = 0;     ///< that series were chosen for: that of `options` is one of a step then
 
   /// Whether to compare the run with another one, of which its error is estimated.
