@@ -280,7 +280,7 @@ ModelSummary model_summary(const std::string& scenario, const SystemSubject& sys
   model.links = info.links;
   model.loaded = system.loaded();
   model.constraints = static_cast<int>(info.constraints.size());
-  model.degrees_of_freedom = static_cast<int>(info.coordinates.size()) - model.constraints;
+  model.degrees_of_freedom = static_cast<int>(info.coordinates.size());
   auto next = system.numbers().parameters.begin();
   for (std::size_t k = 0; k < info.own_parameters(); ++k) {
     const auto end = next + info.parameter_sizes[k];

@@ -179,7 +179,7 @@ constexpr std::array<JsonRow, 46> rows = {{
      [](const Summary& s) { return to_json(s.model.natural); }},
     {{"parameters", parameters_schema, "of the model, by name", "", systems},
      [](const Summary& s) { return named(s.model.parameters); }},
-    {{"degrees_of_freedom", "integer", "coordinates less constraints", "", systems},
+    {{"degrees_of_freedom", "integer", "coordinates less the constraints that do not follow from others at the start", "", systems},
      [](const Summary& s) { return Json(s.model.degrees_of_freedom); }},
     {{"assembled", numbers_schema, "coordinates and rates of the start that constraints gave", "", systems},
      [](const Summary& s) { return named(s.model.assembled); }},

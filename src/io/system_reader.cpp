@@ -249,6 +249,14 @@ void read_start(const Section& root, const SystemSubject& system, SystemScenario
     start.v = system.rates(0, start.q, table.momenta());
   }
   scenario.assembled = put_together(table, system, start);
+  const int all = static_cast<int>(system.info().constraints.size());
+  scenario.constraints = independent_constraints(system, start);
+  if (scenario.constraints < all) {
+    scenario.warnings.push_back(
+        std::to_string(all - scenario.constraints) + " of the " + std::to_string(all) +
+        " constraints follow from the others at the start: there is one motion, and many forces "
+        "that make it, of which small ones are told");
+  }
 }
 
 /// Warnings of angles that were probably meant in degrees, one for each key.

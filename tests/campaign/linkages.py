@@ -114,13 +114,11 @@ def hung_chain(dice: random.Random, dimension: int = 2, bobs: int = 0) -> Linkag
 
 def chain_in_angles(dice: random.Random) -> Linkage:
     linkage = hung_chain(dice)
-    bobs = len(linkage.masses)
-    ends = [linkage.hooks[0].at, *linkage.places, linkage.hooks[1].at]
+    ends = [linkage.hooks[0].at, *linkage.places]
     for before, after in pairwise(ends):
         x, y = after[0] - before[0], after[1] - before[1]
         linkage.angles.append(math.atan2(x, -y))
         linkage.lengths.append(math.hypot(x, y))
-    assert len(linkage.angles) == bobs + 1
     return linkage
 
 
@@ -228,7 +226,7 @@ def start(linkage: Linkage) -> dict:
 
 
 def angle_rates(linkage: Linkage) -> list[float]:
-    ends = [[0.0, 0.0], *linkage.velocities, [0.0, 0.0]]
+    ends = [[0.0, 0.0], *linkage.velocities]
     return [
         ((b[0] - a[0]) * math.cos(turn) + (b[1] - a[1]) * math.sin(turn)) / length
         for a, b, turn, length in zip(ends, ends[1:], linkage.angles, linkage.lengths, strict=False)
@@ -242,7 +240,7 @@ def in_places(linkage: Linkage, dice: random.Random) -> str:
         names = ", ".join(f'model.coordinate("{axis}_{k + 1}", "m")' for axis in axes)
         lines.append(f"    at[{k}] = [{names}]")
         lines.append(f"    v[{k}] = [model.rate(x) for x in at[{k}]]")
-        lines.append(f'    model.point("bob_{k + 1}", *at[{k}])')
+        lines.append(f'    model.point("bob_{k + 1}", at[{k}])')
     for k, hook in enumerate(linkage.hooks):
         terms = [
             f"{a!r}" + (f" + {s!r} * sin({hook.frequency!r} * model.time + {hook.phase!r})" if s else "")
@@ -269,7 +267,6 @@ def in_places(linkage: Linkage, dice: random.Random) -> str:
 
 
 def in_angles(linkage: Linkage) -> str:
-    links = len(linkage.lengths)
     lines = [
         "from sympy import cos, sin",
         "",
@@ -285,20 +282,20 @@ def in_angles(linkage: Linkage) -> str:
             f"    across, up = {length!r} * cos(theta), {length!r} * sin(theta)",
             "    vx, vy = vx + across * model.rate(theta), vy + up * model.rate(theta)",
         ]
-        if k == links - 1:
-            break
         lines += [
             f"    kinetic = kinetic + {linkage.masses[k]!r} * (vx**2 + vy**2) / 2",
             f"    potential = potential + {linkage.masses[k] * linkage.gravity!r} * y",
-            f'    model.point("bob_{k + 1}", x, y)',
+            f'    model.point("bob_{k + 1}", (x, y))',
         ]
         if linkage.damping:
             lines.append(f"    lost = lost + {linkage.damping!r} * (vx**2 + vy**2) / 2")
     lines.append("    model.lagrangian = kinetic - potential")
     if linkage.damping:
         lines.append("    model.dissipation = lost")
-    for axis, off in zip("xy", linkage.hooks[1].at, strict=True):
-        lines.append(f'    model.constraint("loop_{axis}", {axis} - ({off!r}), "m")')
+    x, y = linkage.hooks[1].at
+    lines.append(
+        f'    model.constraint("end", (x - {x!r}) ** 2 + (y - {y!r}) ** 2 - {linkage.bars[-1][2]!r}, "m^2")'
+    )
     return "\n".join(lines) + "\n"
 
 
@@ -439,7 +436,7 @@ class LinkageSubject(truth.Subject):
     def of_angles(self, columns):
         x = y = vx = vy = Real(0)
         found = {}
-        for k, length in enumerate(self.linkage.lengths[:-1]):
+        for k, length in enumerate(self.linkage.lengths):
             theta = columns[f"theta_{k + 1}"].astype(Real)
             name = f"theta_{k + 1}_dot"
             rate = columns[name if name in columns else truth.other_spelling(name)].astype(Real)

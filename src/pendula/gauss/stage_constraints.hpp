@@ -6,6 +6,7 @@
 #include <limits>
 #include <pendula/gauss/lobatto_nodes.hpp>
 #include <pendula/numeric/compensated.hpp>
+#include <pendula/numeric/general_inverse.hpp>
 #include <pendula/numeric/pack_rows.hpp>
 #include <pendula/system/constraint_forces.hpp>
 #include <pendula/system/system_model.hpp>
@@ -174,17 +175,16 @@ class StageConstraints {
     return work;
   }
 
-  /// Throws std::invalid_argument unless a state keeps the constraints, and they can be told apart there.
+  /// Throws std::invalid_argument unless a state keeps the constraints.
   void require(double time, const double* q, const double* v) {
     here_.set_time(time);
     start_.look(here_, q);
     start_.stop(here_, q, v, first_.data());
     for (std::size_t i = 0; i < count_; ++i) {
-      double speed = 0;
+      double speed = at_rest * size(i, q);
       for (std::size_t k = 0; k < coordinates_; ++k) speed += std::abs(start_.slope(i, k) * v[k]);
       require(i, "0", start_.value(i), size(i, q));
       require(i, "a rate of 0", start_.rate(i), speed);
-      if (!std::isfinite(first_[i])) fail(i, "one that others do not contain where the motion starts, got none");
     }
   }
 
@@ -272,9 +272,7 @@ class StageConstraints {
         }
       }
     }
-    std::fill(inverse_.begin(), inverse_.end(), 0.0);
-    for (std::size_t at = 0; at < all; ++at) inverse_[at * all + at] = 1;
-    responses_.solve(inverse_.data(), static_cast<Eigen::Index>(all));
+    responses_.find(inverse_.data());
   }
 
   // What impulses push, by slopes at the nodes.
@@ -305,6 +303,7 @@ class StageConstraints {
   static constexpr double roundings = 4;             // of a sum
   static constexpr double largest_rounding = 1e-12;  // of coordinates, where constraints nearly depend on one another
   static constexpr double kept = 1e-10;              // by a start, relative to what coordinates and rates are
+  static constexpr double at_rest = 1e-4;            // of coordinates a second: rounding moves them, too
 
   LobattoNodes<Width> nodes_;
   SystemAt<Width> at_nodes_;
@@ -317,7 +316,8 @@ class StageConstraints {
   Rows values_, slopes_, rates_;  // of the constraints there
   std::vector<double> first_, last_, end_push_, room_, start_place_;
   std::vector<double> lacking_, moved_, inverse_;
-  LinearSystem masses_, responses_;
+  LinearSystem masses_;
+  GeneralInverse responses_;
   double time_ = 0, h_ = 0, rounding_ = 0;
 };
 

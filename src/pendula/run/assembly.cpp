@@ -50,13 +50,17 @@ class Assembly {
 
   /// Minimises ½ vᵀ M v where (∂g/∂q) v + ∂g/∂t = 0.
   std::string move(const std::vector<bool>& free) {
+    for (Eigen::Index k = 0; k < start_.v.size(); ++k) {
+      if (free[static_cast<std::size_t>(k)]) start_.v[k] = 0;
+    }
+    return change_rates(free, start_.v);
+  }
+
+  /// Minimises ½ dᵀ M d of changes d of the free rates, of which `known` are part.
+  std::string change_rates(const std::vector<bool>& free, const Eigen::VectorXd& known) {
     Matrix mass(start_.q.size(), start_.q.size());
     here_(&SystemFunctions::mass_matrix, start_.q.data(), mass.data());
-    Eigen::VectorXd kept = start_.v;
-    for (Eigen::Index k = 0; k < kept.size(); ++k) {
-      if (free[static_cast<std::size_t>(k)]) kept[k] = 0;
-    }
-    const Eigen::VectorXd rates = rates_of(kept);
+    const Eigen::VectorXd rates = rates_of(start_.v);
     const Matrix slopes = chosen(slopes_, free);
     const Eigen::Index count = slopes.cols(), all = count + slopes.rows();
     Matrix equations = Matrix::Zero(all, all);
@@ -64,20 +68,36 @@ class Assembly {
     equations.topLeftCorner(count, count) = chosen(Matrix(chosen(mass, free).transpose()), free);
     equations.topRightCorner(count, slopes.rows()) = slopes.transpose();
     equations.bottomLeftCorner(slopes.rows(), count) = slopes;
-    right.head(count) = -chosen(mass, free).transpose() * kept;
+    right.head(count) = -chosen(mass, free).transpose() * known;
     right.tail(slopes.rows()) = -rates;
-    put(free, least(equations, right).head(count), kept);
-    start_.v = kept;
-    const Eigen::VectorXd left = rates_of(kept);
+    Eigen::VectorXd change = Eigen::VectorXd::Zero(start_.v.size());
+    put(free, least(equations, right).head(count), change);
+    start_.v += change;
+    const Eigen::VectorXd left = rates_of(start_.v);
     for (Eigen::Index i = 0; i < left.size(); ++i) {
-      const double size = (slopes_.row(i).transpose().cwiseProduct(kept)).cwiseAbs().sum();
+      const double size = (slopes_.row(i).transpose().cwiseProduct(start_.v)).cwiseAbs().sum() + at_rest * size_of(i);
       if (!(std::abs(left[i]) <= enough * size) && left[i] != 0) return left_over("rate of ", left);
     }
     return "";
   }
 
+  int independent() {
+    look(start_.q);
+    constexpr double least = 1e-10;
+    Matrix scaled = slopes_;
+    for (Eigen::Index i = 0; i < scaled.rows(); ++i) {
+      const double size = scaled.row(i).norm();
+      if (size > 0) scaled.row(i) /= size;
+    }
+    Eigen::CompleteOrthogonalDecomposition<Eigen::MatrixXd> factors;
+    factors.setThreshold(least);
+    factors.compute(scaled);
+    return static_cast<int>(factors.rank());
+  }
+
  private:
   static constexpr double rounding = 1e-15, enough = 1e-11, shortest = 1e-6;
+  static constexpr double at_rest = 1e-3;  // of the size of coordinates a second: rounding moves them, too
 
   void look(const Eigen::VectorXd& q) {
     here_(&SystemFunctions::constraints, q.data(), values_.data(), slopes_.data());
@@ -92,16 +112,20 @@ class Assembly {
   double lacking() const {
     double most = 0;
     for (Eigen::Index i = 0; i < values_.size(); ++i) {
-      double size = 0;
-      for (Eigen::Index k = 0; k < start_.q.size(); ++k) {
-        const double angle = info_.is_angle[static_cast<std::size_t>(k)] ? 1 : 0;
-        size += std::abs(slopes_(i, k)) * std::max(std::abs(start_.q[k]), angle);
-      }
-      const double left = std::abs(values_[i]);
+      const double size = size_of(i), left = std::abs(values_[i]);
       if (left != 0 || std::isnan(size)) most = std::max(most, size > 0 ? left / size : 1.0);
       if (std::isnan(left)) return left;
     }
     return most;
+  }
+
+  double size_of(Eigen::Index i) const {
+    double size = 0;
+    for (Eigen::Index k = 0; k < start_.q.size(); ++k) {
+      const double angle = info_.is_angle[static_cast<std::size_t>(k)] ? 1 : 0;
+      size += std::abs(slopes_(i, k)) * std::max(std::abs(start_.q[k]), angle);
+    }
+    return size;
   }
 
   static Matrix chosen(const Matrix& of, const std::vector<bool>& free) {
@@ -141,6 +165,18 @@ class Assembly {
 };
 
 }  // namespace
+
+void SystemSubject::close(Motion& state) const {
+  if (info().constraints.empty()) return;
+  const std::vector<bool> all(info().coordinates.size(), true);
+  Assembly assembly(*this, state);
+  assembly.place(all);
+  assembly.change_rates(all, Eigen::VectorXd::Zero(state.v.size()));
+}
+
+int independent_constraints(const SystemSubject& system, Motion state) {
+  return Assembly(system, state).independent();
+}
 
 std::string assemble(const SystemSubject& system, const FreeNumbers& free, Motion& start) {
   Assembly assembly(system, start);

@@ -17,4 +17,7 @@ struct FreeNumbers {
 /// sentence; empty where it is done.
 std::string assemble(const SystemSubject& system, const FreeNumbers& free, Motion& start);
 
+/// How many constraints do not follow from others in a state.
+int independent_constraints(const SystemSubject& system, Motion state);
+
 }  // namespace pendula

@@ -215,6 +215,7 @@ class FedSubject : public Subject {
   Observation observe(const Motion& motion) const override { return fed_.subject->observe(motion); }
   std::optional<double> energy_scale() const override { return fed_.subject->energy_scale(); }
   bool loaded() const override { return true; }
+  void close(Motion& state) const override { fed_.subject->close(state); }
   bool damped() const override { return true; }
   bool balances(Method method) const override { return !is_explicit(method) && fed_.subject->balances(method); }
   std::vector<std::string> expected_trouble(const RunOptions& options) const override {

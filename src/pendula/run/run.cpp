@@ -96,6 +96,7 @@ Track Run::try_out(const RunOptions& options, double share, Track track,
   trial.options = options;
   trial.start.q *= 1 + share;
   trial.start.v *= 1 + share;
+  trial.subject->close(trial.start);
   trial.every = std::numeric_limits<std::int64_t>::max();
   trial.rows = {};
   trial.judged = false;

@@ -93,6 +93,9 @@ class Subject {
   /// Null if this one has no signals, and for sampled feedback.
   virtual std::shared_ptr<const Subject> part_at(double /*time*/) const { return nullptr; }
 
+  /// Brings a state that is near its constraints onto them.
+  virtual void close(Motion& /*state*/) const {}
+
   /// The columns of inputs that feedback or signals add to.
   virtual std::vector<std::size_t> fed_columns() const { return {}; }
 

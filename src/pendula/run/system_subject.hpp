@@ -175,6 +175,8 @@ class SystemSubject : public Subject {
     row.push_back(seen.energy);
   }
 
+  void close(Motion& state) const override;  // in assembly.cpp
+
   std::vector<std::size_t> fed_columns() const override {
     std::vector<std::size_t> columns;
     columns.reserve(feedback_.size());

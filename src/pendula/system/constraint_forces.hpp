@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <pendula/numeric/general_inverse.hpp>
 #include <pendula/numeric/linear_system.hpp>
 #include <pendula/system/system_model.hpp>
 #include <vector>
@@ -11,6 +12,7 @@ namespace pendula {
 
 /// Constraints g(q, t) = 0 of a system at one place, and forces Gᵀ λ, G = ∂g/∂q, by which they hold there:
 ///   K λ = −(G a + d²g/dt² without accelerations),  K = G M⁻¹ Gᵀ,  a the accelerations without them.
+/// Where constraints follow from others, λ is one of many, and Gᵀ λ is the same for all.
 class ConstraintForces {
  public:
   explicit ConstraintForces(const SystemInfo& info)
@@ -38,10 +40,9 @@ class ConstraintForces {
         double sum = 0;
         for (std::size_t k = 0; k < coordinates_; ++k) sum += slope(i, k) * moved(j, k);
         softness_.matrix(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j)) = sum;
-        inverse_[i * count_ + j] = i == j ? 1 : 0;
       }
     }
-    softness_.solve(inverse_.data(), static_cast<Eigen::Index>(count_));
+    softness_.find(inverse_.data());
   }
 
   /// g, ∂g/∂q, M⁻¹ (∂g/∂q)ᵀ, K⁻¹ there.
@@ -87,7 +88,8 @@ class ConstraintForces {
   std::vector<double> moved_;    // M⁻¹ Gᵀ, constraint by constraint
   std::vector<double> inverse_;  // of K
   std::vector<double> rates_, second_;
-  LinearSystem masses_, softness_;
+  LinearSystem masses_;
+  GeneralInverse softness_;
 };
 
 }  // namespace pendula
