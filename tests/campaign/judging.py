@@ -48,7 +48,9 @@ DOUBTFUL = {
 COLUMNS_AGREE = 1e-11  # energies, of their size, and points with the coordinates beside them
 MOST_ROWS = 80
 # What does not say how far a run can be trusted.
-BESIDE = re.compile(r"has no effect|more than two turns|^event |the run cannot go on later|follow from the others at the start|copy \d+ ends")
+BESIDE = re.compile(
+    r"has no effect|more than two turns|^event |the run cannot go on later|follow from the others at the start|copy \d+ ends"
+)
 
 
 @dataclass

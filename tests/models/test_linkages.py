@@ -1,7 +1,5 @@
 """Models with constraints: order, what holds at rounding, energy, starts, and truths that no solver of ours gave."""
 
-import csv
-import json
 import math
 
 import pytest
@@ -159,7 +157,7 @@ def test_order_is_twice_the_number_of_stages(name, scenario, simulate):
     for stages, steps in ((1, (32, 64, 128)), (2, (32, 64, 128)), (3, (16, 32, 64)), (4, (16, 24, 32))):
         runs = [simulate(file, run__stages=stages, run__step=1 / (pace * n)) for n in steps]
         errors = [off(run, truth) for run in runs]
-        order = math.log(errors[0] / errors[-1]) / math.log(steps[-1] / steps[0])
+        order = math.log(errors[-2] / errors[-1]) / math.log(steps[-1] / steps[-2])
         assert abs(order - 2 * stages) < 0.5, (stages, errors)
         for run in runs:
             assert max(run["constraint_error"].values()) < 1e-13, (stages, run["constraint_error"])
