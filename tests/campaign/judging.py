@@ -49,7 +49,8 @@ COLUMNS_AGREE = 1e-11  # energies, of their size, and points with the coordinate
 MOST_ROWS = 80
 # What does not say how far a run can be trusted.
 BESIDE = re.compile(
-    r"has no effect|more than two turns|^event |the run cannot go on later|follow from the others at the start|copy \d+ ends"
+    r"has no effect|more than two turns|^event |the run cannot go on later|copy \d+ ends"
+    r"|follow from the others at the start"
 )
 
 
