@@ -36,7 +36,7 @@ struct RunSetup : RunRequest {
   std::shared_ptr<const Subject> subject;
   Motion start;
   bool judged = true;  ///< whether to look for reasons not to trust the result
-  /// To find.
+  /// Events to find.
   std::vector<Event> events = {};  // NOLINT(readability-redundant-member-init): left out in initializers
   double motion_tolerance = 0;     ///< that series were chosen for: that of `options` is one of a step then
 

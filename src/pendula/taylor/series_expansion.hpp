@@ -117,8 +117,8 @@ class SeriesExpansion {
   static constexpr Slopes slopes{};
   static constexpr Bends bends{};
 
-  /// Such sums of the numbers of a state from `begin` to `end`; of one motion also of those that share a register with
-  /// them.
+  /// Computes such sums for the numbers of a state from `begin` to `end`; for one motion also for those that share a
+  /// register with them.
   template <class Which>
   void sum_all(const L& tau, Which which, PackRows<W>& to, std::size_t begin, std::size_t end) const {
     const auto add = [&]<class Lanes>(const Lanes& at, std::size_t first, std::type_identity<Lanes>) {

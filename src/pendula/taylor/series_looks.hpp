@@ -79,7 +79,7 @@ class SeriesLooks {
   // that may be narrow are looked at as closely as by a Gauss method of `most_looks` nodes.
   static constexpr int looks = 3, most_looks = 8;
   static constexpr double far_turn = 0.5, far_way = 0.25;  // rad; of the largest length
-  static constexpr double largest_ratio = 10;  // of bases of powers in a step, which looks at three places show
+  static constexpr double largest_ratio = 10;  // of the largest to the smallest base of a power that changes evenly
 
   /// In which members the step goes so far that forces on the way may not show at its end.
   Mask goes_far(const Step& step) const {
@@ -122,7 +122,7 @@ class SeriesLooks {
     return bends_so(step, tau);
   }
 
-  /// Those of the motion that was seen.
+  /// Finds the accelerations of the state in seen_.
   void find_accelerations(const L& time) {
     systems_.here(time, &SystemFunctions::acceleration, seen_[0], seen_[seen_.rows() / 2], found_[0]);
   }
@@ -160,8 +160,8 @@ class SeriesLooks {
     return arguments_[static_cast<std::size_t>(look) * systems_.info().argument_is_base.size() + a];
   }
 
-  /// How arguments change from look to look. Even: bases of powers change by more, but less than `largest_ratio`, and
-  /// have no place near zero between the looks. What such a power adds is seen from its end or from its middle.
+  /// How arguments change from look to look: by little; or evenly, where only bases of powers change by more, by less
+  /// than `largest_ratio` in all, and do not turn near zero between the looks. The middle and the end show such powers.
   struct Change {
     Mask is_small, is_even;
   };

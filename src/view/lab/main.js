@@ -350,9 +350,8 @@ class Lab {
       held: this.hand.isHolding ? this.hand.seen : null,
       show: this.show,
     });
-    const panel = this.panels[this.frames % this.panels.length];
-    if (this.playing && panel.isSeen) panel.draw();
-    if (!this.playing) for (const each of this.panels) if (each.isSeen) each.draw();
+    const due = this.playing ? [this.panels[this.frames % this.panels.length]] : this.panels;
+    if (history.rows) for (const panel of due) if (panel.isSeen) panel.draw(); // energies are those of a computed row
     this.#writeTime();
     if (this.shown > 12) at("hint").classList.add("gone"); // after some seconds it is not needed
   }
