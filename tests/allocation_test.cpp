@@ -1,10 +1,15 @@
 // No allocation inside a step: every operator new and malloc between two steps is counted.
 
+#include <array>
 #include <atomic>
+#include <cmath>
 #include <cstdlib>
 #include <new>
 #include <pendula/chain/chain_solver.hpp>
+#include <pendula/gauss/lagrangian_solver.hpp>
 #include <pendula/gauss/stepper.hpp>
+#include <pendula/kernels/four_bar.hpp>
+#include <pendula/system/kernel_table.hpp>
 
 #include "support/random_chain.hpp"
 #include "support/run.hpp"
@@ -116,6 +121,22 @@ TEST(Allocation, NoneInAStepTakenInParts) {
     ASSERT_TRUE(integrator->step(1.5));
     EXPECT_EQ(allocations - before, 0) << solver;
     EXPECT_GT(integrator->statistics().rejected_steps, 0) << solver;
+  }
+}
+
+TEST(Allocation, NoneInAStepWithConstraints) {
+  // The third bar, and where it hangs, follow from the other two.
+  const double a = 1.1, b = 1.9, c = std::acos(-(std::cos(a) + 1.5 * std::cos(b)) / 1.2);
+  const std::array parameters = {9.81, std::sin(a) + 1.5 * std::sin(b) + 1.2 * std::sin(c)};
+  const SystemModel model(system_table<kernels::FourBar>, {parameters.data(), nullptr, {}});
+  const Motion start(0, Eigen::Vector3d(a, b, c), Eigen::Vector3d::Zero());
+  for (int stages = 1; stages <= 8; ++stages) {
+    GaussStepper<LagrangianSolver<>> stepper(model, stages, {}, Iteration::fixed_point);
+    ASSERT_TRUE(stepper.start(start));
+    ASSERT_TRUE(stepper.step(1e-3));
+    const long before = allocations;
+    for (int i = 0; i < 100; ++i) ASSERT_TRUE(stepper.step(2e-3));
+    EXPECT_EQ(allocations - before, 0) << stages << " stages";
   }
 }
 

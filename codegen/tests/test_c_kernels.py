@@ -412,7 +412,7 @@ def test_what_a_kernel_says_of_itself(everything):
         "constant_masses\t0",
         "coordinate\tx\tm\t0\t0",
         "coordinate\ty\tm\t0\t0",
-        "coordinate\ttheta\trad\t1\t1",
+        "coordinate\ttheta\trad\t1\t0",
         "parameter\ta\t1\t1\t1.3\t1\t0",
         "parameter\tb\t\t1\t0.7\t1\t0",
         "input\tu\tN",
@@ -420,6 +420,8 @@ def test_what_a_kernel_says_of_itself(everything):
         "point\tp\t2\tbob",
         "point\tr\t3\tbob",
         *(line for line in lines if line.startswith("argument\t")),
+        "constraint\ttied\tm^2",
+        "constraint\tturned\trad",
         f"series\t1\t61\t77\t{loaded.table.series.kept}",
         *(f"sum\t{first}\t{second}" for first, second in loaded.table.series.series.places),
     ]

@@ -8,6 +8,7 @@
 #include <memory>
 #include <optional>
 #include <pendula/numeric/number_text.hpp>
+#include <pendula/run/assembly.hpp>
 #include <pendula/run/chain_subject.hpp>
 #include <pendula/run/library.hpp>
 #include <pendula/run/system_subject.hpp>
@@ -156,15 +157,18 @@ SystemNumbers usual_numbers(const SystemInfo& info) {
   return numbers;
 }
 
-/// The first start with a finite energy.
+/// The first start with a finite energy that keeps the constraints.
 Motion usual_start(const SystemSubject& system) {
   constexpr int most = 40;
+  const std::vector<bool> none(system.info().coordinates.size(), false);
   for (int number = 0; number < most; ++number) {
     Motion start = any_start(system.info(), number);
-    if (std::isfinite(system.observe(start).energy)) return start;
+    system.close(start);
+    if (std::isfinite(system.observe(start).energy) && assemble(system, {none, none}, start).empty()) return start;
   }
+  const std::string what = system.info().constraints.empty() ? " has an energy" : " has an energy and can be assembled";
   throw io::InputError("check: expected a scenario with a start: at none of " + std::to_string(most) +
-                       " that were tried the model " + std::string(system.info().name) + " has an energy");
+                       " that were tried the model " + std::string(system.info().name) + what);
 }
 
 void check_model(const CheckOptions& options, Tally& tally) {

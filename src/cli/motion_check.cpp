@@ -8,6 +8,7 @@
 #include <memory>
 #include <pendula/run/integrator.hpp>
 #include <pendula/run/run.hpp>
+#include <pendula/run/system_subject.hpp>
 #include <utility>
 
 namespace pendula::cli {
@@ -23,6 +24,12 @@ constexpr double most_roundings = 30;
 std::string label(const std::string& what, int stages, Form form) {
   return what + ", " + std::to_string(stages) + (stages == 1 ? " stage, " : " stages, ") +
          (form == Form::momentum ? "momentum" : "velocity") + " form";
+}
+
+// Velocity form, Newton and derivatives cannot keep constraints.
+bool has_constraints(const Subject& subject) {
+  const auto* const system = dynamic_cast<const SystemSubject*>(&subject);
+  return system != nullptr && !system->info().constraints.empty();
 }
 
 }  // namespace
@@ -51,20 +58,23 @@ MotionCheck::MotionCheck(std::string_view kernel, const Subject& subject, Motion
 std::vector<CheckLine> MotionCheck::lines() const {
   std::vector<CheckLine> lines;
   const auto add = [&](const std::function<CheckLine(const Span&)>& line) { lines.push_back(best(line)); };
-  for (const Form form : {Form::momentum, Form::velocity}) {
+  std::vector<Form> forms = {Form::momentum};
+  const bool is_free = !has_constraints(subject_);
+  if (is_free) forms.push_back(Form::velocity);
+  for (const Form form : forms) {
     for (const int stages : {1, 2, 3}) {
       add([this, stages, form](const Span& span) { return order(stages, form, span); });
     }
   }
-  for (const Form form : {Form::momentum, Form::velocity}) {
+  for (const Form form : forms) {
     add([this, form](const Span& span) { return energy(form, span); });
   }
   add([this](const Span& span) { return way_back(span); });
-  add([this](const Span& span) { return iterations(span); });
+  if (is_free) add([this](const Span& span) { return iterations(span); });
   add([this](const Span& span) { return full_order(span); });
   add([this](const Span& span) { return dense_output(span); });
   add([this](const Span& span) { return event(span); });
-  const bool differentiates = !subject_.loaded() && subject_.switches().empty();
+  const bool differentiates = is_free && !subject_.loaded() && subject_.switches().empty();
   if (differentiates) add([this](const Span& span) { return tangents(span); });
   return lines;
 }
@@ -211,6 +221,7 @@ double MotionCheck::growth(const Motion& from, double time, const Span& span) co
     near.q[k] += (k % 2 == 0 ? change : -change) * span.q[k];
     near.v[k] += (k % 3 == 0 ? change : -change) * span.v[k];
   }
+  subject_.close(near);
   const RunOptions eight = options(8, Form::momentum);
   const std::optional<End> there = run(eight, from, 16, time), nearby = run(eight, near, 16, time);
   return there && nearby ? distance(there->motion, nearby->motion, span) / change : none;

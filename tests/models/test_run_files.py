@@ -1,5 +1,8 @@
 """Runs of models that go on from their run files."""
 
+import shutil
+from itertools import product
+
 import h5py
 import numpy as np
 import pytest
@@ -11,24 +14,24 @@ def bits(file):
         return {name: data[...].tobytes() for name, data in run.items() if name not in ("run", "events")}
 
 
-@pytest.mark.parametrize("name", ["cart_chain", "driven_chain", "furuta", "swinging_atwood"])
-@pytest.mark.parametrize("method", ["gauss", "dopri5"])
+@pytest.mark.parametrize(
+    ("name", "method"),
+    [
+        *product(("cart_chain", "driven_chain", "furuta", "swinging_atwood"), ("gauss", "dopri5")),
+        ("four_bar", "gauss"),
+    ],
+)
 def test_a_run_goes_on_as_if_it_had_never_stopped(name, method, pendula, tmp_path):
     # By an accuracy, the tolerance depends on how long a run is.
     method = ["--set", f"run.method={method}", "--set", "run.tolerance=1e-9", "--quiet"]
-    if name == "cart_chain":
-        method += ["--set", "run.accuracy="]
-    assert (
-        pendula("simulate", EXAMPLES / f"{name}.toml", *method, "-o", "whole.h5", cwd=tmp_path).returncode
-        == 0
-    )
-    first = ["--set", "run.duration=0.777"]
-    assert (
-        pendula(
-            "simulate", EXAMPLES / f"{name}.toml", *method, *first, "-o", "part.h5", cwd=tmp_path
-        ).returncode
-        == 0
-    )
+    for other in ["run.accuracy"] * (name == "cart_chain") + ["run.step"] * (name == "four_bar"):
+        method += ["--set", f"{other}="]
+    for file in EXAMPLES.glob(f"{name}.*"):
+        shutil.copy(file, tmp_path)
+    whole = ["simulate", f"{name}.toml", *method, "-o", "whole.h5"]
+    part = ["simulate", f"{name}.toml", *method, "-o", "part.h5", "--set", "run.duration=0.777"]
+    for run in (whole, part):
+        assert pendula(*run, cwd=tmp_path).returncode == 0
     with h5py.File(tmp_path / "whole.h5") as whole:
         end = whole["t"][-1]
     for duration in [*np.random.default_rng(11).uniform(0.777, end, 5).cumsum(), end]:

@@ -175,10 +175,11 @@ void SystemSubject::close(Motion& state) const {
 }
 
 int independent_constraints(const SystemSubject& system, Motion state) {
-  return Assembly(system, state).independent();
+  return system.info().constraints.empty() ? 0 : Assembly(system, state).independent();
 }
 
 std::string assemble(const SystemSubject& system, const FreeNumbers& free, Motion& start) {
+  if (system.info().constraints.empty()) return {};
   Assembly assembly(system, start);
   std::string left = assembly.place(free.coordinates);
   return left.empty() ? assembly.move(free.rates) : left;
