@@ -12,5 +12,6 @@ def define(model, links):
         model.lagrangian += mass * (model.rate(bob[0]) ** 2 + model.rate(bob[1]) ** 2) / 2 - mass * g * bob[1]
         model.point(f"bob_{k}", bob)
         x, y = x + length * sin(angle), y - length * cos(angle)
+    model.point("support", (d, 0), kind="pivot")
     model.constraint("loop_x", x - d, "m")
     model.constraint("loop_y", y, "m")

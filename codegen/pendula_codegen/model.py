@@ -124,7 +124,8 @@ class Constraint:
 
 @dataclass(frozen=True)
 class Connection:
-    """Something drawn between two points, by number, -1 for the origin. kind: "spring", "thread" or "pulleys"."""
+    """Something drawn between two points, by number, -1 for the origin. kind: "rod", "spring",
+    "thread" or "pulleys"."""
 
     kind: str
     ends: tuple[int, int]
@@ -320,6 +321,13 @@ class Model:
         self._check(Add(*values), f"point {name}", (*self._positions(), *motions, self.time))
         self.points.append(Point(name, values, kind))
         return self.points[-1]
+
+    def rod(self, start: Point | str, end: Point | str) -> None:
+        """Draws a rod between two points, or a point and "origin".
+
+        Rods between a point and the one before it, whose distance does not change, are drawn without being asked for.
+        """
+        self._connect("rod", start, end)
 
     def spring(self, start: Point | str, end: Point | str) -> None:
         """Draws a spring between two points, or a point and "origin". What it does stands in the Lagrangian."""

@@ -76,10 +76,10 @@ def test_points_say_what_they_are_drawn_as(tmp_path):
         "wall = model.point('wall', (0, 1), kind='pivot'); model.point('cart', (x, 0), kind='cart'); "
         "model.point('ball', (x, y)); model.spring(wall, 'cart'); model.thread('origin', 'ball'); "
         "model.point('ground', (0, -1), kind='floor'); block = model.point('block', (1, x), kind='weight'); "
-        "model.pulleys(block, wall)",
+        "model.pulleys(block, wall); model.rod(block, 'ball')",
     )
     assert [point.kind for point in model.points] == ["pivot", "cart", "bob", "floor", "weight"]
-    connections = [("spring", (0, 1)), ("thread", (-1, 2)), ("pulleys", (4, 0))]
+    connections = [("spring", (0, 1)), ("thread", (-1, 2)), ("pulleys", (4, 0)), ("rod", (4, 2))]
     assert [(each.kind, each.ends) for each in model.connections] == connections
     lines = [
         "point wall 2 pivot",
@@ -89,6 +89,7 @@ def test_points_say_what_they_are_drawn_as(tmp_path):
         "connection thread -1 2",
         "point block 2 weight",
         "connection pulleys 4 0",
+        "connection rod 4 2",
     ]
     c = render_c(model, "said.py", "said.c").replace("\\t", " ")
     program = render_bytecode(model).replace("\t", " ")
@@ -99,8 +100,8 @@ def test_points_say_what_they_are_drawn_as(tmp_path):
         assert line in llvm
     header = render_model(model, "said.py").text
     assert 'point_kinds = {"pivot", "cart", "bob", "floor", "weight"};' in header
-    assert 'connection_kinds = {"spring", "thread", "pulleys"};' in header
-    assert "connection_ends = {0, 1, -1, 2, 4, 0};" in header
+    assert 'connection_kinds = {"spring", "thread", "pulleys", "rod"};' in header
+    assert "connection_ends = {0, 1, -1, 2, 4, 0, 4, 2};" in header
 
 
 @pytest.mark.parametrize("line", REFUSED)

@@ -114,8 +114,8 @@ def body_of(run: Run) -> Body:
     lengths = np.linalg.norm(np.diff(places, axis=1), axis=2)
     keeps = np.ptp(lengths, axis=0) <= 1e-6 * lengths.max(axis=0) + 1e-300
     kinds = ["", *(run.kinds or ["bob"] * (count - 1))]
-    connections = [Connection(each.kind, each.start + 1, each.end + 1) for each in run.connections]
-    joined = {frozenset((each.start, each.end)) for each in connections}
+    joints = [Connection(each.kind, each.start + 1, each.end + 1) for each in run.connections]
+    joined = {frozenset((each.start, each.end)) for each in joints}
 
     def is_rod(k: int) -> bool:
         if run.is_chain:
@@ -127,6 +127,8 @@ def body_of(run: Run) -> Body:
         return bool(keeps[k]) or (k == 0 and count == 2)
 
     rods = [(k, k + 1) for k in range(count - 1) if is_rod(k)]
+    rods += [(each.start, each.end) for each in joints if each.kind == "rod"]
+    connections = [each for each in joints if each.kind != "rod"]
     rails = {k: rail_of(places[:, k]) for k, kind in enumerate(kinds) if kind == "cart"}
     masses = run.masses
     relative = np.ones(count - 1) if masses is None else np.cbrt(masses / masses.max())

@@ -38,7 +38,7 @@ class Point:
 
 @dataclass(frozen=True)
 class Connection:
-    """A "spring" or "thread" between two points, by number; -1 is the origin."""
+    """A "rod", "spring" or "thread" between two points, by number; -1 is the origin."""
 
     kind: str
     start: int

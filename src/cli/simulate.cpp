@@ -224,12 +224,13 @@ class RunSession {
   void run_copy(int copy, const RunOptions& by, const std::function<bool()>& interrupted) {
     RunSetup setup = setup_;
     setup.start.q[0] += copy * options_.apart;
+    setup.subject->close(setup.start);
     setup.options = by;
     setup.accuracy.error = 0;
     setup.judged = false;
     if (page_) {
       const view::Coordinate& first = page_->scene().coordinates.front();
-      page_->begin_run(first.name + " + " + rounded(copy * options_.apart) + ' ' + first.unit);
+      page_->begin_run(first.name + " + " + rounded(setup.start.q[0] - setup_.start.q[0], 3) + ' ' + first.unit);
     }
     Run run(setup);
     if (page_) run.add(*page_, page_->times(setup.duration, static_cast<std::size_t>(copy)));

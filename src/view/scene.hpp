@@ -33,7 +33,7 @@ struct ActingInput {
 
 /// Something drawn between two points, by number; -1 is the origin.
 struct Connection {
-  std::string kind;  ///< "spring", "thread" or "pulleys"
+  std::string kind;  ///< "rod", "spring", "thread" or "pulleys"
   int from = -1, to = -1;
 };
 

@@ -29,6 +29,7 @@ def define(model, links):
     model.point("bob", bob)
     model.spring(wall, "cart")
     model.thread("origin", "bob")
+    model.rod("origin", wall)
 """
 KINDS = ["pivot", "cart", "bob"]
 
@@ -174,7 +175,7 @@ def test_the_page_knows_what_points_are(by, scenario):
     scene = scene_in(view(scenario("own"), by))
     assert [point[0] for point in scene["points"]] == ["wall", "cart", "bob"]
     assert [point[4] for point in scene["points"]] == KINDS
-    assert scene["connections"] == [["spring", 0, 1], ["thread", -1, 2]]
+    assert scene["connections"] == [["spring", 0, 1], ["thread", -1, 2], ["rod", -1, 0]]
 
 
 # Counts boxes and the corners of lines while a page draws.
@@ -233,7 +234,7 @@ def test_a_laboratory_draws_the_same(scenario, open_lab, tmp_path):
     assert (told.returncode, told.stderr) == (0, "")
     page = open_lab(file=tmp_path / "lab.html")
     stage = page.evaluate(
-        "(({ kinds, connections, rails, hangs }) => ({ kinds, connections, rails, hangs }))(pendulaLab.stage)"
+        "(({ kinds, connections, rails, rods }) => ({ kinds, connections, rails, rods }))(pendulaLab.stage)"
     )
     assert stage["kinds"] == KINDS
     assert [(each["kind"], each["ends"]) for each in stage["connections"]] == [
@@ -242,7 +243,8 @@ def test_a_laboratory_draws_the_same(scenario, open_lab, tmp_path):
     ]
     assert stage["rails"][0] is None
     assert stage["rails"][1] == pytest.approx([0.8, 0, 0.6], abs=1e-12)  # measured 1e-16
-    assert stage["hangs"] == [-2, -2, 1]  # the bob by a rod on the cart
+    # The bob on the cart, and what the model says.
+    assert [(rod["on"], rod["i"]) for rod in stage["rods"]] == [(1, 2), (-1, 0)]
 
 
 @pytest.fixture

@@ -55,7 +55,11 @@ def test_describe_tells_what_a_scenario_may_set(pendula, tmp_path):
 
 def test_examples_set_nothing_else(pendula):
     """Each parameter, input and coordinate of an example is one that `models` tells."""
-    models = {model["model"]: model for model in json.loads(pendula("models", "--json").stdout)}
+    built_in = {model["model"]: model for model in json.loads(pendula("models", "--json").stdout)}
+    own = {file.name: file for file in EXAMPLES.glob("*.py") if "def define(" in file.read_text()}
+    models = built_in | {
+        name: json.loads(pendula("describe", file, "--json").stdout) for name, file in own.items()
+    }
     scenarios = [tomllib.loads(file.read_text()) for file in EXAMPLES.glob("*.toml")]
     scenarios = [scenario for scenario in scenarios if "system" in scenario]
     assert {scenario["system"]["model"] for scenario in scenarios} == set(models)
@@ -66,7 +70,7 @@ def test_examples_set_nothing_else(pendula):
         assert {drive["input"] for drive in scenario["system"].get("drive", [])} <= names["inputs"]
         keys = {each[key] for each in told["coordinates"] for key in ("name", "rate", "momentum")}
         families = {key.removesuffix("_1") for key in keys}
-        assert set(scenario["start"]) <= keys | families
+        assert set(scenario["start"]) <= keys | families | {"assemble"}
 
 
 def test_a_file_of_ones_own(pendula, tmp_path):
@@ -107,3 +111,13 @@ def test_what_is_wrong_is_told(pendula, tmp_path, arguments, expected):
     ended = pendula("describe", *arguments, cwd=tmp_path)
     assert (ended.returncode, ended.stdout) == (2, "")
     assert expected in ended.stderr
+
+
+def test_a_linkage(pendula):
+    lines = pendula("describe", EXAMPLES / "four_bar.py").stdout.splitlines()
+    for line in [
+        "constraint  unit",
+        "loop_x      m",
+        "degrees of freedom: 1, if no constraint follows from others",
+    ]:
+        assert line in lines

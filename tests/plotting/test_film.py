@@ -311,10 +311,14 @@ def drawn_run(**more) -> Run:
 def test_a_film_draws_springs_and_threads():
     kinds = ["pivot", "pivot", "bob"]
     body = body_of(
-        drawn_run(kinds=kinds, connections=[Connection("spring", 1, 2), Connection("thread", -1, 2)])
+        drawn_run(
+            kinds=kinds,
+            connections=[Connection("spring", 1, 2), Connection("thread", -1, 2), Connection("rod", -1, 1)],
+        )
     )
     assert body.connections == [Connection("spring", 2, 3), Connection("thread", 0, 3)]
-    assert body.rods == [(1, 2)]  # from pivot to wall, which keep their distance; none where the spring is
+    # From pivot to wall, which keep their distance, none where the spring is, and what the model says.
+    assert body.rods == [(1, 2), (0, 2)]
     assert body.pivots == [0, 1, 2]
     plain, sprung = (
         np.asarray(next(Film([run], 20, 400).frames()), dtype=int)

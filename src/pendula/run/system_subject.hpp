@@ -147,8 +147,9 @@ class SystemSubject : public Subject {
     }
     for (std::size_t k = 0; k < info().constraints.size(); ++k) {
       const std::string name(info().constraints[k]), unit(info().constraint_units[k]);
-      add("force_" + name, unit == "1" || unit.empty() ? "J" : "J/(" + unit + ")", Role::force,
-          "force of the constraint " + name);
+      const bool is_one = unit.find_first_of(" */") == std::string::npos;  // m, m^2
+      const std::string over = unit == "1" || unit.empty() ? "" : is_one ? "/" + unit : "/(" + unit + ")";
+      add("force_" + name, "J" + over, Role::force, "force of the constraint " + name);
     }
     add("energy", "J", Role::energy, "energy v dL/dv - L");
     return quantities;

@@ -60,7 +60,7 @@ struct SystemInfo {
   SeriesInfo series;
   /// What points are drawn as: "bob", "cart", "pivot", "weight" or "floor"; empty: all are bobs.
   std::span<const std::string_view> point_kinds;
-  std::span<const std::string_view> connection_kinds;  ///< "spring", "thread" or "pulleys"
+  std::span<const std::string_view> connection_kinds;  ///< "rod", "spring", "thread" or "pulleys"
   std::span<const int> connection_ends;                ///< two for each connection: 0-based points, -1 is the origin
   std::span<const SeriesSum> series_sums;              ///< (SeriesInfo::sums)
   /// What is 0 at all times (SystemFunctions::constraints).

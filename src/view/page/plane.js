@@ -64,9 +64,11 @@ class Plane {
     pen.strokeStyle = rgba(rgb.rod, faint ? 0.45 : 1);
     pen.lineWidth = faint ? 1.3 : clamp((0.014 * stage.reach * stage.pixels) / Math.sqrt(stage.count / 3 + 1), 1.3, 5);
     pen.beginPath();
+    let last = null;
     for (const { on, i } of stage.rods) {
-      if (on < 0 || on !== i - 1 || !stage.isHung[on]) pen.moveTo(...at(on).slice(0, 2));
+      if (on !== last) pen.moveTo(...at(on).slice(0, 2));
       pen.lineTo(...at(i));
+      last = i;
     }
     pen.stroke();
     pen.lineWidth = faint ? 1.2 : 2;

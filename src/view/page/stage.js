@@ -15,17 +15,18 @@ function radiiOf({ space, kinds, masses, reach }) {
 }
 
 /// Whether anything is fixed to the origin.
-function holdsOrigin({ hangs, connections }) {
-  return hangs.includes(-1) || connections.some(({ ends }) => ends.includes(-1));
+function holdsOrigin({ rods, connections }) {
+  return rods.some(({ on }) => on === -1) || connections.some(({ ends }) => ends.includes(-1));
 }
 
 class Stage extends View {
   /// Sets what is drawn. Each point has the point that it hangs on by a rod (-1: the origin, -2: nothing), a kind, a rail and a
   /// mass; `connections` have kinds and ends; [low, high] is the box of all motions, `reach` the scale of lengths.
   shape(told) {
-    Object.assign(this, told, { count: told.kinds.length, radii: radiiOf(told) });
-    this.rods = this.hangs.map((on, i) => ({ on, i })).filter(({ on }) => on !== -2);
-    this.isHung = this.hangs.map((on) => on !== -2);
+    const [rods, connections] = [true, false].map((are) => told.connections.filter(({ kind }) => (kind === "rod") === are));
+    Object.assign(this, told, { count: told.kinds.length, radii: radiiOf(told), connections });
+    this.rods = told.hangs.map((on, i) => ({ on, i })).filter(({ on }) => on !== -2);
+    this.rods.push(...rods.map(({ ends }) => ({ on: Math.min(...ends), i: Math.max(...ends) })));
     this.fit(told);
     this.scenery = this.space === 2 ? new Plane(this) : new Space(this);
   }
