@@ -164,6 +164,11 @@ class Model(System):
         return [name for name, _ in self._info.inputs]
 
     @property
+    def constraints(self) -> list[str]:
+        """Names of the constraints: ``run["force_loop"]`` is the force of the constraint loop."""
+        return [name for name, _ in self._info.constraints]
+
+    @property
     def points(self) -> list[str]:
         """Names of the points: ``run["bob_x"]`` is a component of the point bob."""
         return self._info.points
@@ -190,7 +195,8 @@ class Model(System):
     def start_names(self) -> list[str]:
         names = dict.fromkeys([*self.coordinates, *(re.sub(r"_\d+$", "", one) for one in self.coordinates)])
         rates = dict.fromkeys([*self.rates, *(re.sub(r"_\d+$", "", one) for one in self.rates)])
-        return [*names, *rates, *(f"p_{name}" for name in names)]
+        found = ["assemble"] if self._info.constraints else []
+        return [*names, *rates, *(f"p_{name}" for name in names), *found]
 
     def model_file(self) -> Path | None:
         return Path(self._name) if self._name.endswith(".py") else None

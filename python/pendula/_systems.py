@@ -220,7 +220,8 @@ class System(ABC):
             ``interval`` seconds; without these, some hundreds or a few thousand evenly in time, and the last state.
         start : mapping, optional
             Coordinates and rates at the start by name, as keyword arguments: ``theta="90 deg"``, ``theta_dot=[0, 1]``.
-            A single number of a chain stands for every link; rates are 0 unless given.
+            A single number of a chain stands for every link; rates are 0 unless given. Of a model with constraints
+            what is not given is found; ``assemble=["theta_2", "theta_3"]`` lists what is found instead.
         events : mapping, optional
             Expressions of the columns that change their sign where an event happens, by name:
             ``{"flip": "abs(theta_2) - pi"}``, or mappings with ``when``, ``direction`` ("up", "down", "both") and

@@ -33,7 +33,7 @@ using Named = std::vector<std::pair<std::string, std::string>>;  // names and un
 /// A model as it is described.
 struct ModelInfo {
   int links = 1;
-  Named coordinates, rates, inputs;
+  Named coordinates, rates, inputs, constraints;
   std::vector<std::tuple<std::string, std::string, double>> parameters;  // with defaults, NaN where there is none
   std::map<std::string, std::string> units;                              // of all of these
   std::vector<std::string> points;
@@ -59,6 +59,7 @@ ModelInfo describe_model(const std::string& model, std::optional<int> links, con
                  .coordinates = named(info.coordinates, info.coordinate_units),
                  .rates = {},
                  .inputs = named(info.inputs, info.input_units),
+                 .constraints = named(info.constraints, info.constraint_units),
                  .parameters = {},
                  .units = {},
                  .points = {info.points.begin(), info.points.end()},
@@ -87,6 +88,7 @@ void define_models(nb::module_& module) {
       .def_ro("coordinates", &ModelInfo::coordinates)
       .def_ro("rates", &ModelInfo::rates)
       .def_ro("inputs", &ModelInfo::inputs)
+      .def_ro("constraints", &ModelInfo::constraints)
       .def_ro("parameters", &ModelInfo::parameters)
       .def_ro("units", &ModelInfo::units)
       .def_ro("points", &ModelInfo::points)

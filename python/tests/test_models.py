@@ -38,6 +38,28 @@ def test_a_model_tells_what_it_has():
         assert pendula.Model(name).coordinates
 
 
+TIED = """
+def define(model, links):
+    x, y = model.coordinate("x", "m"), model.coordinate("y", "m")
+    model.lagrangian = (model.rate(x) ** 2 + model.rate(y) ** 2) / 2 - 9.81 * y
+    model.constraint("rod", (x**2 + y**2 - 0.64) / 1.6, "m")
+"""
+
+
+def test_a_model_with_constraints(tmp_path):
+    """A pendulum: its rod pulls by m (v²/l - g y/l)."""
+    (tmp_path / "tied.py").write_text(TIED)
+    tied = pendula.Model(tmp_path / "tied.py")
+    assert tied.constraints == ["rod"] and pendula.Model("furuta").constraints == []
+    run = tied.simulate(3.0, x=0.6, y=-0.5, assemble=["y", "x_dot", "y_dot"])
+    assert run.summary["assembled"]["y"] == pytest.approx(-math.sqrt(0.28), abs=1e-14)
+    assert max(run.summary["constraint_error"].values()) < 1e-13  # measured
+    pull = ((run["x_dot"] ** 2 + run["y_dot"] ** 2) - 9.81 * run["y"]) / 0.8
+    assert abs(run["force_rod"] + pull).max() < 1e-8
+    with pytest.raises(pendula.InputError, match="unknown keyword assemble"):
+        pendula.Model("furuta").simulate(1.0, assemble=["theta"])
+
+
 def test_kernels_are_told(tmp_path, monkeypatch):
     file = tmp_path / "own.py"
     file.write_text(MODEL)

@@ -18,6 +18,7 @@ QUESTIONS = {
     "install": ("how-to/install.html", "pip install"),
     "first run": ("tutorials/first-pendulum.html", "simulate"),
     "own model": ("tutorials/own-mechanism.html", "model.lagrangian"),
+    "linkage": ("tutorials/linkage.html", "model.constraint"),
     "event": ("how-to/events.html", "t_events"),
     "gradient": ("how-to/gradients.html", "by_start"),
     "ensemble": ("how-to/ensembles.html", "pendula.ensemble"),
