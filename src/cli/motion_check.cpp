@@ -26,7 +26,7 @@ std::string label(const std::string& what, int stages, Form form) {
          (form == Form::momentum ? "momentum" : "velocity") + " form";
 }
 
-// Velocity form, Newton and derivatives cannot keep constraints.
+// Velocity form and derivatives cannot keep constraints.
 bool has_constraints(const Subject& subject) {
   const auto* const system = dynamic_cast<const SystemSubject*>(&subject);
   return system != nullptr && !system->info().constraints.empty();
@@ -70,7 +70,7 @@ std::vector<CheckLine> MotionCheck::lines() const {
     add([this, form](const Span& span) { return energy(form, span); });
   }
   add([this](const Span& span) { return way_back(span); });
-  if (is_free) add([this](const Span& span) { return iterations(span); });
+  add([this](const Span& span) { return iterations(span); });
   add([this](const Span& span) { return full_order(span); });
   add([this](const Span& span) { return dense_output(span); });
   add([this](const Span& span) { return event(span); });

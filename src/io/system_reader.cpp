@@ -340,7 +340,9 @@ SystemScenario read_system(const Section& root, const std::filesystem::path& fol
     throw InputError(place_of(error.what(), drives, model) + ": " + error.what());
   }
   read_start(root, *scenario.system, scenario);
-  scenario.warnings = degree_warnings(root, scenario.system->info());
+  for (std::string& warning : degree_warnings(root, scenario.system->info())) {
+    scenario.warnings.push_back(std::move(warning));
+  }
   return scenario;
 }
 

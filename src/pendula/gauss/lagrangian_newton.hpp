@@ -7,6 +7,7 @@
 #include <pendula/gauss/lagrangian_stages.hpp>
 #include <pendula/gauss/stage_solver.hpp>
 #include <pendula/gauss/stage_system.hpp>
+#include <pendula/system/system_model.hpp>
 
 namespace pendula {
 
@@ -16,28 +17,56 @@ template <int Width, class Form>
 class LagrangianNewton {
  public:
   using Stages = LagrangianStages<Width, Form>;
+  using L = typename Stages::L;
 
-  LagrangianNewton(std::size_t coordinates, int stages) : system_(coordinates, stages), equations_(coordinates) {}
+  LagrangianNewton(const SystemModel& model, int stages)
+      : system_(model.coordinates() + model.info().constraints.size(), stages), equations_(model.coordinates()) {}
 
   /// Improves the unknowns once. What follows from them is as it was before the correction.
   Correction correct(Stages& stages) {
     equations_.linearize(stages);
+    stages.follow_constraints(true);
     for (std::size_t row = 0; row < equations_.count(); ++row) {
-      system_.set_residual(row, equations_.residual(stages, row));
+      system_.set_residual(row, stages.free_of_constraints(row, equations_.residual(stages, row)));
       for (std::size_t column = 0; column < equations_.count(); ++column) {
         for (std::size_t k = 0; k < system_.stages(); ++k) {
-          system_.set_derivative(row, column, k, equations_.derivative(stages.columns(), row, column, k));
+          const L derivative = equations_.derivative(stages.columns(), row, column, k);
+          system_.set_derivative(row, column, k, stages.free_of_constraints(row, column, k, derivative));
         }
       }
     }
+    if (stages.is_constrained()) constrain(stages);
     system_.solve();
     return apply(stages);
   }
 
   /// Computes what follows from the unknowns as they are.
-  void follow(Stages& stages) { equations_.follow(stages); }
+  void follow(Stages& stages) {
+    equations_.follow(stages);
+    stages.follow_constraints(false);
+  }
 
  private:
+  // Constraints are further rows, at the nodes 1 … s, and their impulses at the nodes 0 … s − 1 further unknowns.
+  void constrain(const Stages& stages) {
+    const auto& constraints = stages.constraints();
+    const std::size_t count = equations_.count();
+    for (std::size_t i = 0; i < constraints.count(); ++i) {
+      system_.set_residual(count + i, constraints.lacking(i));
+      for (std::size_t k = 0; k < system_.stages(); ++k) {
+        const L hb(stages.columns().hb(k));
+        for (std::size_t column = 0; column < count; ++column) {
+          system_.set_derivative(count + i, column, k, hb * constraints.lacking_by(i, column, k));
+          system_.set_derivative(column, count + i, k, L(0.0) - constraints.pushed_by(column, i, k));
+        }
+        for (std::size_t j = 0; j < constraints.count(); ++j) {
+          const L soft = L(i == j ? constraints.softness(i) : 0.0) * stages.columns().unit(k);
+          system_.set_derivative(count + i, count + j, k, soft);
+        }
+      }
+    }
+  }
+
   Correction apply(Stages& stages) {
     double largest = 0, scale = stages.floor();
     int worst = -1;
@@ -52,8 +81,10 @@ class LagrangianNewton {
         largest = size;
         worst = static_cast<int>(k);
       }
+      stages.correct_impulses(
+          i, [&](std::size_t constraint) { return system_.correction(equations_.count() + constraint, i); });
     }
-    return {largest > 0 ? largest / scale : 0, worst};
+    return {stages.relative(largest, scale), worst};
   }
 
   detail::StageSystem system_;

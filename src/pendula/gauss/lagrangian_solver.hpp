@@ -34,12 +34,12 @@ class LagrangianSolver : public StageIterations<LagrangianStages<Width, Form>> {
   static constexpr int sequences = 2;  ///< of corrections of its fixed point (FixedPointStop)
 
   /// Throws std::invalid_argument unless the method has so many stages, at most Width, and keeps constraints that are
-  /// there: Gauss methods in momentum form do, by fixed point.
+  /// there: Gauss methods in momentum form do.
   LagrangianSolver(const Model& model, int stages, Iteration iteration = Iteration::automatic,
                    Family family = Family::gauss)
       : Base(iteration_for(model, iteration, family), newton_cost(model, stages), model, checked(stages), family),
         family_(family),
-        newton_(model.coordinates(), stages),
+        newton_(model, stages),
         forcing_(model, family, stages),
         field_(model, stages),
         // Where lengths change, the motion may be singular between the stages, which is never so where all coordinates
@@ -134,15 +134,14 @@ class LagrangianSolver : public StageIterations<LagrangianStages<Width, Form>> {
     };
     require(family == Family::gauss, "method: expected gauss, got radau");
     require(Form::has_fixed_point, "form: expected momentum, got velocity");
-    require(asked != Iteration::newton, "iteration: expected fixed-point, got newton");
-    if (!model.info().constraints.empty()) return Iteration::fixed_point;
     return Form::has_fixed_point ? asked : Iteration::newton;
   }
 
   // Cost of a Newton iteration in fixed-point iterations, to within a third, as measured on kernels of one to six
   // coordinates (g++ 12, AVX2 and AVX-512).
   static double newton_cost(const Model& model, int stages) {
-    return stages * std::min(1.6 + 0.75 * static_cast<double>(model.coordinates()), 5.5);
+    const auto unknowns = static_cast<double>(model.coordinates() + model.info().constraints.size());
+    return stages * std::min(1.6 + 0.75 * unknowns, 5.5);
   }
 
   bool has_to_look() const { return !stages_.info().argument_is_base.empty(); }
@@ -151,11 +150,8 @@ class LagrangianSolver : public StageIterations<LagrangianStages<Width, Form>> {
   // its last correction.
   void complete() {
     if (is_complete_) return;
-    if (stages_.is_constrained()) {
-      stages_.finish_constraints();
-    } else {
-      newton_.follow(stages_);
-    }
+    if (last_.convergence == Convergence::quadratic) newton_.follow(stages_);
+    if (stages_.is_constrained()) stages_.finish_constraints();
     is_complete_ = true;
   }
 

@@ -151,13 +151,23 @@ class LagrangianStages : public SystemMotion<StagesInLanes<Eigen::Dynamic, doubl
   void start_cold() {
     Base::start_cold(true);
     prediction_.forget();
+    if (constraints_) push_as_at_start();
   }
 
   /// One fixed-point iteration, in momentum form; its change, relative to the size of the step.
   double iterate() {
     const StageIteration on{columns_.m(), columns_.each_hb(), state_.data(), weights_.data(), U_.front().numbers()};
     if (constraints_) return iterate_constrained(on);
-    return relative(at_stages()(&SystemFunctions::iterate, on));
+    const IterationChange found = at_stages()(&SystemFunctions::iterate, on);
+    return relative(found.change, std::max(found.size, floor()));
+  }
+
+  /// A change of increments, relative to their size. What rounding may make of them by way of constraints looks like
+  /// rounding: an iteration goes on as long as it shrinks.
+  double relative(double change, double size) const {
+    if (change == 0) return 0;
+    const double rounding = constraints_ ? constraints_->rounding() : 0;
+    return change <= rounding ? std::numeric_limits<double>::epsilon() * change / rounding : change / size;
   }
 
   /// Takes note of the first of these changes in a step.
@@ -283,7 +293,8 @@ class LagrangianStages : public SystemMotion<StagesInLanes<Eigen::Dynamic, doubl
   /// What the error of the step follows from. Sizes of rates are √(Σ M_kk v_k²).
   StepShape shape() {
     Base::find_speeds();
-    const double fastest = Base::fastest(), rounding = StepShape::visible * floor_ / Base::invisible;
+    const double fastest = Base::fastest(), coordinates = StepShape::visible * floor_ / Base::invisible;
+    const double rounding = constraints_ ? std::max(coordinates, 4 * constraints_->rounding()) : coordinates;
     L coefficients(0.0);
     for (std::size_t k = 0; k < count_; ++k) {
       const L a = L(weight(k)) * columns_.legendre(moved(k));
@@ -349,6 +360,31 @@ class LagrangianStages : public SystemMotion<StagesInLanes<Eigen::Dynamic, doubl
   std::pair<double, double> constraint_errors() const {
     return constraints_ ? constraints_->errors() : std::pair<double, double>{};
   }
+  /// Those of a system that has some.
+  const StageConstraints<Width>& constraints() const { return *constraints_; }
+  /// Finds what constraints lack and push where increments lead, and derivatives of that.
+  void follow_constraints(bool with_derivatives) {
+    if (!constraints_) return;
+    if (with_derivatives) {
+      constraints_->linearize(state_.data(), U_.front().numbers());
+    } else {
+      constraints_->follow(state_.data(), U_.front().numbers());
+    }
+  }
+  /// The residual of the momentum of a coordinate without what constraints push, and its derivative by an increment of
+  /// another over h b.
+  L free_of_constraints(std::size_t row, const L& residual) const {
+    return constraints_ ? residual - constraints_->pushed(row) : residual;
+  }
+  L free_of_constraints(std::size_t row, std::size_t column, std::size_t stage, const L& derivative) const {
+    if (!constraints_) return derivative;
+    return derivative - L(columns_.hb(stage)) * constraints_->pushed_by_increment(row, column, stage);
+  }
+  /// Takes from the impulse of each constraint at a node what `by(constraint)` says.
+  template <class By>
+  void correct_impulses(std::size_t node, By by) {
+    for (std::size_t i = 0; i < info().constraints.size(); ++i) constraints_->correct(i, node, by(i));
+  }
   /// Finds what constraints push at the end of the solved step.
   void finish_constraints() { constraints_->finish(state_.data(), U_.front().numbers()); }
 
@@ -377,16 +413,17 @@ class LagrangianStages : public SystemMotion<StagesInLanes<Eigen::Dynamic, doubl
     find_rates(time_);
     constraints_->prepare(time_, h(), room(0), weights_.data());
     if (from.cold) {
-      dynamics_.here(time_, &SystemFunctions::acceleration, room(0), room(2), room(3));
-      constraints_->start_cold(room(0), room(2), room(3));
+      push_as_at_start();
     } else {
       constraints_->predict(from.again ? 0 : 1, ratio);
     }
     constraints_->set_out(state_.data(), U_.front().numbers());
   }
 
-  double relative(const IterationChange& found) const {
-    return found.change == 0 ? 0 : found.change / std::max(found.size, floor());
+  void push_as_at_start() {
+    find_rates(time_);
+    dynamics_.here(time_, &SystemFunctions::acceleration, room(0), room(2), room(3));
+    constraints_->start_cold(room(0), room(2), room(3));
   }
 
   double iterate_constrained(const StageIteration& on) {
@@ -399,9 +436,7 @@ class LagrangianStages : public SystemMotion<StagesInLanes<Eigen::Dynamic, doubl
     const IterationChange found =
         detail::replace_increments<Width>(on.hb, Base::call(0, 2), on.weights, 2 * count_, on.increments);
     constraints_->correct(on.start, on.increments);
-    const double rounding = constraints_->rounding();
-    // What may be rounding looks like it: it goes on as long as it shrinks.
-    return found.change > rounding ? relative(found) : std::numeric_limits<double>::epsilon() * found.change / rounding;
+    return relative(found.change, std::max(found.size, floor()));
   }
 
   std::span<const double> end_pushes() const {

@@ -43,6 +43,11 @@ class LobattoNodes {
   /// What impulses at the nodes 0 … s − 1, one a lane, add to momenta at the stages.
   L pushed(const double* impulses) const { return product(push_, impulses); }
 
+  /// What an impulse at node m adds, and where an increment of stage j moves nodes 1 … s.
+  L push(std::size_t m) const { return L::load(push_[m]); }
+  L reach(std::size_t j) const { return L::load(reach_[j]); }
+  double reach(std::size_t j, std::size_t node) const { return reach_[j][node - 1]; }
+
   /// The increments of stages that add the same.
   L as_increments(const double* impulses) const { return product(increments_, impulses); }
 

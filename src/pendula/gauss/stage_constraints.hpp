@@ -41,6 +41,8 @@ class StageConstraints {
         pushes_(coordinates_),
         places_(coordinates_),
         still_(coordinates_),
+        moving_(coordinates_),
+        curvature_(coordinates_ * coordinates_),
         values_(count_),
         slopes_(count_ * coordinates_),
         rates_(2 * count_),
@@ -54,6 +56,8 @@ class StageConstraints {
         inverse_(lacking_.size() * lacking_.size()),
         masses_(static_cast<Eigen::Index>(coordinates_)),
         responses_(static_cast<Eigen::Index>(lacking_.size())) {}
+
+  std::size_t count() const { return count_; }
 
   /// Adds to accelerations what constraints bring in a state.
   void accelerate(double time, const double* q, const double* v, double* a) {
@@ -115,6 +119,42 @@ class StageConstraints {
     }
     push();
   }
+
+  // --- For Newton ---
+
+  /// Looks at constraints where increments lead.
+  void follow(const Compensated<double>* start, const double* increments) {
+    look(start, increments);
+    push();
+  }
+  /// The same, with what the following derivatives need.
+  void linearize(const Compensated<double>* start, const double* increments) {
+    follow(start, increments);
+    find_curvature();
+  }
+  /// What constraint i lacks at the nodes 1 … s, and its derivative by an increment of coordinate k at stage j.
+  L lacking(std::size_t i) const { return fma(L(softness(i)), L::load(impulses_[i]), L::load(values_[i])); }
+  L lacking_by(std::size_t i, std::size_t k, std::size_t j) const {
+    return L::load(slopes_[i * coordinates_ + k]) * nodes_.reach(j);
+  }
+  /// The derivative of pushed(k) by the impulse of constraint i at node m.
+  L pushed_by(std::size_t k, std::size_t i, std::size_t m) const { return L(slope(m, i, k)) * nodes_.push(m); }
+  /// The derivative of pushed(k) by an increment of coordinate l at stage j, which moves nodes.
+  L pushed_by_increment(std::size_t k, std::size_t l, std::size_t j) const {
+    alignas(pack_alignment) double numbers[width] = {};
+    const double* const curved = curvature_[k * coordinates_ + l];
+    for (std::size_t m = 1; m < nodes_.stages(); ++m) numbers[m] = curved[m - 1] * nodes_.reach(j, m);
+    return nodes_.pushed(numbers);
+  }
+  /// How far constraint i gives way to its impulse: where constraints follow from others, so much that Newton's matrix
+  /// is regular, and impulses that do nothing stay small.
+  double softness(std::size_t i) const {
+    if (!start_.depend()) return 0;
+    double sum = 0;
+    for (std::size_t k = 0; k < coordinates_; ++k) sum += start_.slope(i, k) * start_.moved(i, k);
+    return softest * h_ * sum;
+  }
+  void correct(std::size_t i, std::size_t node, double by) { impulses_[i][node] -= by; }
 
   /// What rounding of coordinates, by way of the constraints, makes of increments; as changes are weighed.
   double rounding() const { return rounding_; }
@@ -275,6 +315,32 @@ class StageConstraints {
     responses_.find(inverse_.data());
   }
 
+  // Σ_i J_i ∂²g_i/∂q_k ∂q_l at the nodes 1 … s − 1: second rates without accelerations are vᵀ g'' v, but for what is
+  // linear in v or does not depend on it.
+  void find_curvature() {
+    const L none = curved(coordinates_, coordinates_);
+    for (std::size_t k = 0; k < coordinates_; ++k) {
+      const L of_k = curved(k, coordinates_);
+      for (std::size_t l = 0; l <= k; ++l) {
+        const L half = L(0.5) * ((curved(k, l) - of_k) + (none - curved(l, coordinates_)));
+        half.store(curvature_[k * coordinates_ + l]);
+        half.store(curvature_[l * coordinates_ + k]);
+      }
+    }
+  }
+  // Σ_i J_i d²g_i/dt² there, where only the coordinates k and l move, at a rate of 1; of 2, where they are the same.
+  L curved(std::size_t k, std::size_t l) {
+    for (std::size_t i = 0; i < coordinates_; ++i) {
+      std::fill_n(moving_[i], width, (i == k ? 1.0 : 0.0) + (i == l ? 1.0 : 0.0));
+    }
+    at_nodes_(&SystemFunctions::constraint_rates, places_[0], moving_[0], rates_[0], rates_[count_]);
+    alignas(pack_alignment) double sums[width] = {};
+    for (std::size_t i = 0; i < count_; ++i) {
+      for (std::size_t m = 1; m < nodes_.stages(); ++m) sums[m - 1] += impulses_[i][m] * rates_[count_ + i][m - 1];
+    }
+    return L::load(sums);
+  }
+
   // What impulses push, by slopes at the nodes.
   void push() {
     for (std::size_t k = 0; k < coordinates_; ++k) {
@@ -302,6 +368,7 @@ class StageConstraints {
 
   static constexpr double roundings = 4;             // of a sum
   static constexpr double largest_rounding = 1e-12;  // of coordinates, where constraints nearly depend on one another
+  static constexpr double softest = 1e-13;           // relative to how far impulses would move it without constraints
   static constexpr double kept = 1e-10;              // by a start, relative to what coordinates and rates are
   static constexpr double at_rest = 1e-4;            // of coordinates a second: rounding moves them, too
 
@@ -312,7 +379,8 @@ class StageConstraints {
   std::size_t count_, coordinates_;
   Rows impulses_;                 // h w λ at the nodes 0 … s − 1, of the last step that was tried
   Rows pushes_;                   // what they push
-  Rows places_, still_;           // at the nodes 1 … s
+  Rows places_, still_, moving_;  // at the nodes 1 … s
+  Rows curvature_;                // there, of what impulses push
   Rows values_, slopes_, rates_;  // of the constraints there
   std::vector<double> first_, last_, end_push_, room_, start_place_;
   std::vector<double> lacking_, moved_, inverse_;

@@ -15,16 +15,17 @@ class GeneralInverse {
 
   explicit GeneralInverse(Index size) : matrix(size, size), system_(size) {}
 
-  /// Writes X, column by column.
-  void find(double* inverse) {
+  /// Writes X, column by column. Returns whether rows of A depend on one another.
+  bool find(double* inverse) {
     const Index size = matrix.rows();
     Eigen::Map<Eigen::MatrixXd> found(inverse, size, size);
     found.setIdentity();
     system_.matrix = matrix;
     system_.solve(inverse, size);
     const auto pivots = system_.matrix.diagonal().cwiseAbs();
-    if (size == 0 || pivots.minCoeff() > least_pivot * pivots.maxCoeff()) return;
+    if (size == 0 || pivots.minCoeff() > least_pivot * pivots.maxCoeff()) return false;
     find_of_fewer(found);
+    return true;
   }
 
   Eigen::MatrixXd matrix;

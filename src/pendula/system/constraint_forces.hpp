@@ -28,6 +28,8 @@ class ConstraintForces {
         softness_(static_cast<Eigen::Index>(count_)) {}
 
   std::size_t count() const { return count_; }
+  /// Whether constraints follow from others there.
+  bool depend() const { return depend_; }
 
   /// Goes to q  (coordinates).
   void look(const SystemAt<1>& here, const double* q) {
@@ -42,7 +44,7 @@ class ConstraintForces {
         softness_.matrix(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j)) = sum;
       }
     }
-    softness_.find(inverse_.data());
+    depend_ = softness_.find(inverse_.data());
   }
 
   /// g, ∂g/∂q, M⁻¹ (∂g/∂q)ᵀ, K⁻¹ there.
@@ -90,6 +92,7 @@ class ConstraintForces {
   std::vector<double> rates_, second_;
   LinearSystem masses_;
   GeneralInverse softness_;
+  bool depend_ = false;
 };
 
 }  // namespace pendula
