@@ -90,7 +90,7 @@ class Run:
             if match := re.fullmatch(r"x_(\d+)", name):
                 link = match[1]
                 columns = [f"{axis}_{link}" for axis in "xyz"]
-            elif name.endswith("_x"):
+            elif name.endswith("_x") and not name.startswith("force_"):
                 columns = [f"{name[:-1]}{axis}" for axis in "xyz"]
             else:
                 continue

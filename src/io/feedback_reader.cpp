@@ -22,12 +22,13 @@ namespace {
 /// The name of columns that feedback must not use: no expression can contain it.
 constexpr const char* nameless = "";
 
-/// Names of the columns that an expression may use: all but inputs, and with `without_energy` all but the energy, too.
+/// Names of the columns that an expression may use: all but inputs and what depends on them, and with `without_energy`
+/// all but the energy, too.
 std::vector<std::string> names_for(const Subject& subject, bool without_energy) {
   std::vector<std::string> names = subject.columns();
   for (const Quantity& quantity : subject.quantities()) {
-    const bool is_energy = quantity.role == Role::energy || quantity.role == Role::force;
-    const bool is_left_out = quantity.role == Role::input || (without_energy && is_energy);
+    const bool depends_on_inputs = quantity.role == Role::input || quantity.role == Role::force;
+    const bool is_left_out = depends_on_inputs || (without_energy && quantity.role == Role::energy);
     for (std::size_t k = 0; is_left_out && k < quantity.size(); ++k) names[quantity.column(k)] = nameless;
   }
   return names;

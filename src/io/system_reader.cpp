@@ -229,7 +229,8 @@ std::vector<std::pair<std::string, double>> put_together(const StartTable& table
   if (info.constraints.empty()) return found;
   const FreeNumbers free = table.free();
   if (const std::string left = assemble(system, free, start); !left.empty()) {
-    throw InputError(table.where(), "start", "coordinates and rates that keep the constraints", left + " left over");
+    throw InputError(table.where(), "start", "coordinates and rates that keep the constraints",
+                     left + " left over; from other guesses of what is found (assemble) it may close");
   }
   for (std::size_t k = 0; k < info.coordinates.size(); ++k) {
     if (free.coordinates[k]) found.emplace_back(info.coordinates[k], start.q[static_cast<Eigen::Index>(k)]);

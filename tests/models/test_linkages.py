@@ -264,6 +264,36 @@ def test_forces_are_columns(scenario, rows):
         assert abs(x * x + y * y - 0.64) < 1e-14
 
 
+CART = """
+def define(model, links):
+    s, x, y = (model.coordinate(name, "m") for name in "sxy")
+    model.lagrangian = model.rate(s) ** 2 + (model.rate(x) ** 2 + model.rate(y) ** 2) / 2 - 9.81 * y
+    model.force(s, model.input("push", "N"))
+    model.constraint("rod", (x - s) ** 2 + y**2 - 0.25, "m^2")
+"""
+PUSHES = {
+    "drive": "constant = 10",
+    "signal": "times = [0.0, 1.0]\nvalues = [8.0, 12.0]",
+    "feedback": 'value = "10 + t - t"\nsample = 0.02',
+}
+
+
+@pytest.mark.parametrize("by", PUSHES)
+def test_forces_know_inputs(by, scenario, rows):
+    """Of a pendulum on a cart that is pushed: λ from d²g/dt² = 0, by hand."""
+    push = f'[[system.{by}]]\ninput = "push"\n{PUSHES[by]}\n'
+    found = rows(scenario(CART, "x = 0.3\ny = -0.4", push))
+    for time, s, x, y, v, u, w, force in zip(
+        *(found[n] for n in ("t", "s", "x", "y", "s_dot", "x_dot", "y_dot", "force_rod")), strict=True
+    ):
+        pushed = 8 + 4 * time if by == "signal" and time < 1 else 12 if by == "signal" else 10
+        d = x - s
+        turning = (u - v) ** 2 + w**2
+        gives = 4 * (d**2 * (1 + 1 / 2) + y**2)  # of masses 2 (cart) and 1
+        assert abs(force * gives / 2 + turning - 9.81 * y - d * pushed / 2) < 1e-9
+        assert abs(d * d + y * y - 0.25) < 1e-13
+
+
 STARTS = {
     'theta_1 = 1.1\ntheta_2 = 1.9\ntheta_3 = 2.9\nassemble = ["theta_3"]': "left over",
     "theta_1 = 1.1\ntheta_2 = 1.2\ntheta_3 = 3.7\ntheta_dot_1 = 1": "left over",

@@ -329,6 +329,12 @@ def test_a_film_draws_springs_and_threads():
     assert heights[0] < 6 and heights[1] > 30  # pixels; measured 3, 42
 
 
+def test_forces_of_constraints_are_no_point():
+    t = np.linspace(0, 1, 51)
+    columns = {"t": t, "bob_x": t, "bob_y": t, "force_loop_x": t, "force_loop_y": t}
+    assert [point.name for point in Run("tied", columns).points] == ["bob"]
+
+
 @pytest.mark.parametrize("length", [1.0, 40.0, 300.0])
 def test_a_spring_has_as_many_zigzags_however_long(length):
     path = shapes.spring(np.array([10.0, 20.0]), np.array([10.0, 20.0 + length]), 5.0)

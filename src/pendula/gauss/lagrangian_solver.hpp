@@ -112,7 +112,7 @@ class LagrangianSolver : public StageIterations<LagrangianStages<Width, Form>> {
   /// The derivative of the step that was solved and not yet accepted.
   using Tangent = LagrangianTangent<Width>;
   Tangent make_tangent() const requires Form::is_symplectic {
-    require_no_constraints(stages_.info(), "derivatives: expected none yet, got some");
+    require_no_constraints(stages_.info(), "derivatives: there are none yet");
     return Tangent(stages_);
   }
   void linearize(Tangent& tangent) const { tangent.linearize(stages_); }

@@ -24,7 +24,8 @@ class Assembly {
     here_.set_time(start.time);
   }
 
-  /// Newton's iteration with the least change of free coordinates; shorter where constraints would get worse.
+  /// Newton's iteration with the least change of free coordinates; shorter where angles would turn far, or constraints
+  /// get worse.
   std::string place(const std::vector<bool>& free) {
     constexpr int most = 100;
     Eigen::VectorXd change = Eigen::VectorXd::Zero(start_.q.size());
@@ -32,6 +33,7 @@ class Assembly {
     double left = lacking();
     for (int correction = 0; correction < most && left > rounding; ++correction) {
       put(free, least(chosen(slopes_, free), -values_), change);
+      change /= std::max(1.0, largest_turn(change) / farthest);
       const Eigen::VectorXd before = start_.q;
       const double was = left;
       for (double part = 1; part > shortest; part /= 2) {
@@ -75,7 +77,7 @@ class Assembly {
     start_.v += change;
     const Eigen::VectorXd left = rates_of(start_.v);
     for (Eigen::Index i = 0; i < left.size(); ++i) {
-      const double size = (slopes_.row(i).transpose().cwiseProduct(start_.v)).cwiseAbs().sum() + at_rest * size_of(i);
+      const double size = slopes_.row(i).transpose().cwiseProduct(start_.v).cwiseAbs().sum() + at_rest * size_of(i);
       if (!(std::abs(left[i]) <= enough * size) && left[i] != 0) return left_over("rate of ", left);
     }
     return "";
@@ -97,6 +99,7 @@ class Assembly {
 
  private:
   static constexpr double rounding = 1e-15, enough = 1e-11, shortest = 1e-6;
+  static constexpr double farthest = 0.3;  // rad a correction
   static constexpr double at_rest = 1e-3;  // of the size of coordinates a second: rounding moves them, too
 
   void look(const Eigen::VectorXd& q) {
@@ -106,6 +109,14 @@ class Assembly {
     Eigen::VectorXd rates(values_.size());
     here_(&SystemFunctions::constraint_rates, start_.q.data(), v.data(), rates.data(), second_.data());
     return rates;
+  }
+
+  double largest_turn(const Eigen::VectorXd& change) const {
+    double most = 0;
+    for (Eigen::Index k = 0; k < change.size(); ++k) {
+      if (info_.is_angle[static_cast<std::size_t>(k)]) most = std::max(most, std::abs(change[k]));
+    }
+    return most;
   }
 
   /// The largest value of a constraint, relative to what coordinates as large as these bring.

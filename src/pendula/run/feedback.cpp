@@ -212,7 +212,15 @@ class FedSubject : public Subject {
     return std::make_unique<Integrator>(std::make_unique<HeldInputs>(fed_, options), size, "system with feedback");
   }
 
-  Observation observe(const Motion& motion) const override { return fed_.subject->observe(motion); }
+  /// Forces of constraints depend on inputs.
+  Observation observe(const Motion& motion) const override {
+    Observation seen = fed_.subject->observe(motion);
+    if (seen.forces.size() == 0) return seen;
+    std::vector<double> inputs = fed_.inputs;
+    for (std::size_t k = 0; k < fed_.laws.size(); ++k) inputs[fed_.laws[k].input] += held(k, motion);
+    for (const Signal& signal : fed_.signals) inputs[signal.input] += signal.at(motion.time);
+    return pendula::with_inputs(fed_.subject, inputs, {})->observe(motion);
+  }
   std::optional<double> energy_scale() const override { return fed_.subject->energy_scale(); }
   bool loaded() const override { return true; }
   void close(Motion& state) const override { fed_.subject->close(state); }

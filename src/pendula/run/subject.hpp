@@ -20,10 +20,11 @@ namespace pendula {
 
 /// Quantities of a state besides its coordinates and rates.
 struct Observation {
-  Eigen::VectorXd points;       ///< components of all points, point after point  [m]
-  double kinetic = 0;           ///< T  [J]
-  double energy = 0;            ///< T + U; for a system h = v·∂L/∂v − L  [J]
-  Eigen::VectorXd forces = {};  ///< of constraints  [J over the unit of each]
+  Eigen::VectorXd points;  ///< components of all points, point after point  [m]
+  double kinetic = 0;      ///< T  [J]
+  double energy = 0;       ///< T + U; for a system h = v·∂L/∂v − L  [J]
+  /// Of constraints  [J over the unit of each].
+  Eigen::VectorXd forces = {};  // NOLINT(readability-redundant-member-init)
 
   double potential() const { return energy - kinetic; }
 };

@@ -54,13 +54,13 @@ SystemModel system_model_of(const ChainSubject<Space>& subject) {
 
 /// Throws std::invalid_argument where derivatives would leave constraints.
 inline SystemModel system_model_of(const SystemSubject& subject) {
-  require_no_constraints(subject.info(), "derivatives: expected none yet, got some");
+  require_no_constraints(subject.info(), "derivatives: there are none yet");
   return {subject.table(), subject.numbers().plain()};
 }
 
 /// The system of a subject. Functions of several pieces are on the pieces that `motion` takes.
 inline SystemModel system_model_of(const SystemSubject& subject, const Motion& motion) {
-  require_no_constraints(subject.info(), "derivatives: expected none yet, got some");
+  require_no_constraints(subject.info(), "derivatives: there are none yet");
   return {subject.table(), subject.numbers_at(motion).plain()};
 }
 template <class Space>
