@@ -444,10 +444,10 @@ class LagrangianStages : public SystemMotion<StagesInLanes<Eigen::Dynamic, doubl
   }
 
   // Increments of a coordinate, or of its momentum with what constraints push.
-  const double* numbers_along(std::size_t k, double* room) const {
+  const double* numbers_along(std::size_t k, double* place) const {
     if (!constraints_ || k < count_) return U_[k].numbers();
-    (L::load(U_[k].numbers()) + constraints_->as_increments(k - count_)).store(room);
-    return room;
+    (L::load(U_[k].numbers()) + constraints_->as_increments(k - count_)).store(place);
+    return place;
   }
 
   L reached(std::size_t k) const {
