@@ -21,10 +21,10 @@ from pendula_codegen.model import Input, Model, rate_name
 
 
 def close_loops(model: Model, laws: Iterable[str]) -> None:
-    """Adds to inputs what laws say: each INPUT=WORDS, operands before what is done with them: `x 9 * ~` is −(x · 9).
+    """Adds feedback laws to inputs: each is INPUT=WORDS in postfix notation, as `x 9 * ~` for −(x · 9).
 
-    Words are numbers, names of columns of the motion, signs (~ is minus of one), comparisons, `?:` of a condition and
-    two values, and functions as `sin()`. What laws say of motions adds up to these, which are functions of time.
+    Words are numbers, names of columns of the motion, operators (~ negates), comparisons, `?:` of a condition and two
+    values, and functions as `sin()`. A prescribed motion, a function of time, becomes the sum of its laws.
     """
     names = _columns(model)
     inputs = {each.symbol.name: each.symbol for each in model.inputs}
@@ -76,7 +76,7 @@ def _sampled(
 
 
 def _exponent(value: Expr) -> Expr:
-    """Roots stay exact."""
+    """An exponent: simple fractions stay exact, others become floats."""
     return sympy.Float(value) if value.is_Rational and value.q > MOST_DENOMINATOR else value
 
 

@@ -145,7 +145,7 @@ def packed_fmu(declared: Declared, request: Request, runtime: Runtime, equations
 
 
 def _rendered(declared: Declared, request: Request, runtime: Runtime, has_equations: bool) -> dict[str, str]:
-    """The C of FMI's functions, and the description. Without equations, derivatives and indicators are left out."""
+    """The C of FMI's functions, and the description. Without equations there are no derivatives and no indicators."""
     values = numbers_of(declared, request.values)
     switches = declared.switches if has_equations else ()
     rows = enumerate(_rows(declared, values, runtime.tolerance, switches))

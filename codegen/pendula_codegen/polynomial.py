@@ -83,19 +83,19 @@ def content(values: Iterable[Number]) -> Number:
 
 
 def is_exact(value: Number) -> bool:
-    """Whether a double is that number."""
+    """Whether a double equals it."""
     numerator = abs(value.numerator)
     odd = numerator // (numerator & -numerator) if numerator else 0
     return value.denominator & (value.denominator - 1) == 0 and odd <= 2**53
 
 
 def size_of(value: Number) -> int:
-    """The logarithm to base 2 of a number that is not 0, but for one."""
+    """The logarithm to base 2 of a number that is not 0, to within 1."""
     return value.numerator.bit_length() - value.denominator.bit_length()
 
 
 def in_range(value: Number) -> bool:
-    """Whether doubles have numbers of this size, and some room."""
+    """Whether doubles reach this size, with some margin."""
     return abs(size_of(value)) < 1000
 
 

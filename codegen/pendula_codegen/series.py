@@ -18,7 +18,8 @@ is the series (t, unit, 0, …).
 What kernels have of this
 -------------------------
 
-Two functions of W motions, W = 1, 2, 4, 8, beside those of SystemFunctions (pendula/system/system_table.hpp):
+Two functions of W motions, W = 1, 2, 4, 8, beside those of SystemFunctions (pendula/system/system_table.hpp), made by
+series_tape.py, series_start.py and series_next.py:
 
     series_start(at, rows)               order 0: reads row 0 of the state, gives row 1 and `kept`
     series_next(at, rows, first, last)   orders first … last, first ≥ 1: give rows first + 1 … last + 1 of the state

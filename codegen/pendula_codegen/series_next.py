@@ -163,7 +163,7 @@ class Next:
         return Elimination(self.tape).solve(factors, right)
 
     def _row(self, k: int, right: Sequence[Value]) -> Value:
-        """M⁻¹ times the right-hand side."""
+        """Row k of M⁻¹ times the right-hand side."""
         tape, zero = self.tape, self.tape.number(0.0)
         found = None
         for j, value in enumerate(right):

@@ -263,9 +263,9 @@ def _times(indicator: Expr, value: Expr) -> Expr:
 
 
 def _guarded(piece: Expr, here: Truth, fixed: Collection[Symbol], zeros: Sequence[Expr]) -> Expr:
-    """The same where it is taken, and finite where it is not.
+    """The piece, made finite where it is not taken.
 
-    Roots of a switching function go on beyond its zero, as those of its size: a step has to come there to find it.
+    A root of a switching function g becomes that of |g|: a step that looks for g = 0 goes past it.
     """
     if not piece.args or not piece.free_symbols - set(fixed):
         return piece

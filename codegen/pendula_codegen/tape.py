@@ -1,7 +1,7 @@
-"""A function as a tape: steps one after the other, each of values that steps before it made.
+"""A function as a tape: a list of operations, each on results of earlier ones.
 
-A Program is a graph of what is worth a name; here every operation is a step of its own, which can be differentiated,
-printed in a language that has no expressions, or interpreted.
+A Program names only what is shared; a tape has a step for every operation, so that it can be differentiated, printed
+in a language without expressions, or interpreted.
 """
 
 from __future__ import annotations

@@ -171,7 +171,7 @@ class Vocabulary:
         return self.polynomial(atom.definition) if atom.definition is not None else atom.argument
 
     def ranking(self, order: Order) -> list[int]:
-        """All atoms, those to be pulled out first in front."""
+        """All atoms, in the order in which they are factored out."""
         sign = -1 if order.last_link_first else 1
         kinds = {kind: k for k, kind in enumerate(order.kinds)}
         return sorted(

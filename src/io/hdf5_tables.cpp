@@ -1,4 +1,4 @@
-// Makes, compresses, writes and reads tables that grow.
+// Makes, compresses, writes and reads tables that grow: run_file.cpp says what stands in them.
 
 #include <hdf5.h>
 #include <isa-l/igzip_lib.h>

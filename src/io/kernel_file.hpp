@@ -20,7 +20,7 @@ inline constexpr const char *compiled_kernel = ".so", *llvm_kernel = ".o", *inte
 /// The extension of kernels that are made here, as the environment asks. Fails if it asks for something unknown.
 const char* kind_of_kernels(const Toolchain& toolchain);
 
-/// Compiler flags for code that runs on every processor that this build does.
+/// Compiler flags for the smallest instruction set of this build.
 std::vector<std::string> flags_of_least_set();
 
 /// A description of such kernels.

@@ -51,7 +51,7 @@ class Entry {
   Entry(const toml::node& node, std::string name, const ScenarioKey& key, const BaseUnits& base = {})
       : node_(&node), name_(std::move(name)), key_(&key), base_(base) {}
 
-  /// The key of the entry with all tables and elements.
+  /// The full key, as start.theta[1].
   const std::string& name() const { return name_; }
   bool is_array() const { return node_->is_array(); }
   bool is_number() const { return node_->is_number(); }

@@ -79,7 +79,7 @@ class Steps:
                 names[step.first] = call_of(f, step.operation, given[0], step.number)
 
     def _system(self, step: Step, given: list[str]) -> None:
-        """A linear system that is too large to be written out: it is an array."""
+        """Calls the solver of a linear system that is too large to be written out, with an array."""
         f = self._f
         array = self._systems[step.first] = f.slot(f.numbers, step.count)
         places = [f.place(array, k * f.width) for k in range(step.count)]

@@ -177,7 +177,7 @@ class RodState : public RodBlocks<Space, N, Num> {
     advance(h, accepted, moved, pushed, at_.along[begin], at_.along_low[begin], at_.free[begin], at_.free_low[begin]);
   }
 
-  /// Adds gravity over a time h. It changes the free rate of the first rod only, because all bobs fall alike.
+  /// Adds gravity over a time h. All bobs fall alike, so that only the free rate of the first rod changes.
   template <class Who>
   void fall(const C& h, const C& gravity, const Who& accepted) {
     Num &free = at_.free[0][D - 1], &low = at_.free_low[0][D - 1];

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <cstdint>
 #include <pendula/numeric/compensated.hpp>
 #include <pendula/system/outcome.hpp>
 #include <pendula/system/plain_integrator.hpp>
@@ -219,82 +220,62 @@ class SingleIntegrator final : public PlainIntegrator {
     return true;
   }
 
-  // --- Adaptive steps, at most h long ---
+  // --- A step of the controller's choice ---
 
-  /// The result of trying steps.
-  struct Trial {
-    double size = 0;  // of the last step tried
-    int rejected = 0;
-    bool is_accepted = false;
-    double unseen = 0;  // impulse between the stages
-  };
+  template <class Method>
+  friend Outcome detail::find_step(Method&, double, int);
+  template <class Method>
+  friend Outcome detail::take_chosen_step(Method&, double);
 
-  // Forces that depend on time are checked for the step that would be taken without the limit h, and a limited step
-  // that fails is repeated without the limit. So a run that is continued takes the same steps as one that was not
-  // interrupted.
+  /// Forces that depend on time are looked at as if nothing cut the step short.
   Outcome chosen_step(double h) {
-    const double longest = subject_.followed(steps_, time(), controller_.step(steps_));
-    const auto before = controller_;
-    bool is_cut = longest > h;
-    Trial trial = is_cut ? find_step(h, 1) : find_step(longest);
-    if (is_cut && !trial.is_accepted) {
-      controller_ = before;
-      trial = find_step(longest);
-      is_cut = !trial.is_accepted || trial.size >= h;
-      if (is_cut) {
-        controller_ = before;
-        trial = find_step(h);
-      }
+    longest_ = subject_.followed(steps_, time(), controller_.step(steps_));
+    before_ = controller_;
+    return detail::take_chosen_step(*this, h);
+  }
+
+  double wanted() { return std::min(longest_, controller_.step(steps_)); }
+  void keep() { rejected_before_ = statistics_.rejected_steps; }
+  void restore() {
+    controller_ = before_;
+    statistics_.rejected_steps = rejected_before_;
+  }
+
+  Outcome try_step(double h, bool /*is_first*/) {
+    unseen_ = 0;
+    const bool is_solved = steps_.solve(time(), h, true);
+    if (is_stopped()) return interrupted(h);
+    if (!is_solved) {
+      controller_.shrink(true, h, 0.5);
+    } else if (controller_.accepts(true, h, steps_)) {
+      if (!subject_.has_to_look()) return ok(h);
+      unseen_ = subject_.unseen(steps_.parts(), steps_.tried(), time(), h, tolerance_).impulse;
+      if (!statistics_.has_to_see(unseen_, h, tolerance_)) return ok(h);
+      controller_.shrink(true, h, 0.5);
     }
-    if (is_stopped()) return interrupted(trial.size);
-    statistics_.rejected_steps += trial.rejected;
-    if (!trial.is_accepted) return failure(Status::tolerance_not_met, controller_.step(steps_));
-    controller_.move_on(true, trial.size, steps_);
-    // A limited step says nothing about the size of the next one, unless it should have been shorter.
-    const bool tells = !is_cut || controller_.step(steps_) < trial.size;
-    if (!tells) controller_ = before;
-    if (!is_cut) statistics_.count_chosen(trial.size);
-    statistics_.step_over(time(), trial.unseen, tolerance_);
+    return failure(Status::tolerance_not_met, h);
+  }
+
+  // A step that is cut short says nothing about the size of the next one, unless it should have been shorter.
+  Outcome take(const Outcome& found, bool is_cut) {
+    controller_.move_on(true, found.step, steps_);
+    if (is_cut && controller_.step(steps_) >= found.step) controller_ = before_;
+    if (!is_cut) statistics_.count_chosen(found.step);
+    statistics_.step_over(time(), unseen_, tolerance_);
     subject_.move_on();
     steps_.accept(true);
-    return accept(trial.size);
+    return accept(found.step);
   }
-
-  /// Tries steps from `longest` on, shorter each time.
-  Trial find_step(double longest, int tries = detail::most_attempts) {
-    Trial trial;
-    double size = longest;
-    for (int attempt = 0; attempt < tries && size > smallest_step() && !is_stopped(); ++attempt) {
-      trial.size = size;
-      trial.is_accepted = is_good(trial);
-      if (trial.is_accepted) break;
-      ++trial.rejected;
-      size = std::min(longest, controller_.step(steps_));
-    }
-    return trial;
-  }
-
-  bool is_good(Trial& trial) {
-    const double h = trial.size;
-    if (!steps_.solve(time(), h, true)) {
-      controller_.shrink(true, h, 0.5);
-      return false;
-    }
-    if (!controller_.accepts(true, h, steps_)) return false;
-    if (!subject_.has_to_look()) return true;
-    trial.unseen = subject_.unseen(steps_.parts(), steps_.tried(), time(), h, tolerance_).impulse;
-    if (!statistics_.has_to_see(trial.unseen, h, tolerance_)) return true;
-    controller_.shrink(true, h, 0.5);
-    return false;
-  }
-
-  double smallest_step() const { return 1e-14 * std::abs(time()); }
 
   Subject subject_;
   Steps steps_;
   typename Steps::Controller controller_;
   StepParts parts_;
   double tolerance_;
+  typename Steps::Controller before_{controller_};  // where the last search for a step began
+  std::int64_t rejected_before_ = 0;
+  double longest_ = 0;  // step that forces which depend on time allow
+  double unseen_ = 0;   // impulse between the stages of the step that was tried
   Statistics statistics_;
   Compensated<double> time_{};
   double begin_ = 0, step_ = 0;  // start and size of the last step; 0: there was none

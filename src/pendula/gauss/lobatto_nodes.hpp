@@ -16,10 +16,10 @@ namespace pendula {
 /// Where constraints hold in a step of a Gauss method with s stages: at the Lobatto nodes d_0 = 0, d_1, …, d_s = 1,
 /// which determine a polynomial of degree s (L. Jay, SIAM J. Numer. Anal. 45, 2007: SPARK (s, s)-Gauss–Lobatto).
 ///
-/// Increments h b V of the stages move coordinates at node k by Σ_j r_kj h b_j V_j, r_kj = (1/b_j) ∫_0^{d_k} ℓ_j. What
-/// forces push at the nodes, impulses J_k = h w_k (∂g/∂q)ᵀ λ_k, adds Σ_k (1 − r_kj) J_k to momenta at stage j, which
-/// makes the method symplectic: r and 1 − r here, as m_ij and m_ji of the stages. Node 0 pushes all stages, node s
-/// none.
+/// Increments h b V of the stages move coordinates at node k by Σ_j r_kj h b_j V_j, r_kj = (1/b_j) ∫_0^{d_k} ℓ_j.
+/// Constraint impulses J_k = h w_k (∂g/∂q)ᵀ λ_k at the nodes add Σ_k (1 − r_kj) J_k to the momenta at stage j. The
+/// method is symplectic because r here and 1 − r there add up to 1, as m_ij and m_ji of the stages do. Node 0 pushes
+/// all stages, node s none.
 template <int Width>
 class LobattoNodes {
   static constexpr auto width = static_cast<std::size_t>(Width);
@@ -34,7 +34,7 @@ class LobattoNodes {
   std::size_t stages() const { return stages_; }
   double d(std::size_t k) const { return d_[k]; }
   double w(std::size_t k) const { return w_[k]; }
-  /// How much larger than what coordinates are off by increments are that make up for it.
+  /// Size of the increments that remove an error of coordinates, relative to that error.
   double gain() const { return gain_; }
 
   /// start + what increments add up to at node k + 1, in lane k.

@@ -172,75 +172,75 @@ class GaussStepper : private StepSolution<Solver> {
   // From such a defect on, a given step is tested for what is damped before its first stage.
   static constexpr double visible_defect = 1e-4;
 
-  // A step of its own choice fails where it would be smaller than this fraction of the time so far.
-  static constexpr double smallest_chosen = 1e-13;
+  template <class Method>
+  friend Outcome detail::find_step(Method&, double, int);
+  template <class Method>
+  friend Outcome detail::take_chosen_step(Method&, double);
 
-  /// One step of the controller's choice, at most so long. Forces that depend on time are looked at as if nothing cut
-  /// the step short. Where a step that is cut short fails, the next one is looked for as if nothing cut it: so a run
-  /// that is interrupted and goes on takes the steps of one that was not.
+  // --- A step of the controller's choice ---
+
   Outcome chosen_step(double most) {
-    const double longest = solver_.followed(time(), controller_.step(), options_.tolerance);
-    if (detail::ends_before(std::min(controller_.step(), longest), most)) return find_step(longest, most);
-    read_member();
-    Outcome outcome = find_step(longest, most, 1);
-    if (outcome) return outcome;
-    write_member();
-    outcome = find_step(longest, std::numeric_limits<double>::infinity());
-    if (outcome && detail::ends_before(outcome.step, most)) return outcome;
-    write_member();
-    forget_linearization();
-    return find_step(longest, most);
+    look_ahead();
+    return detail::take_chosen_step(*this, most);
   }
 
-  /// Tries steps until one is good enough. One whose error is too large predicts the stages of the next, shorter one.
-  Outcome find_step(double longest, double most, int tries = detail::most_attempts) {
-    const StepController<double> before = controller_;
-    int shorter = halved_ > often ? 0 : fixed_point_worth;
-    halved_ = std::max(0, halved_ - 1);
-    bool is_found = false;
-    for (int attempts = 1;; ++attempts) {
-      const double chosen = std::min(controller_.step(), longest);
-      const bool is_cut = !detail::ends_before(chosen, most);
-      const double h = is_cut ? most : chosen;
-      const PredictedFrom from = is_found ? PredictedFrom::same_step : PredictedFrom::last_step;
-      Outcome outcome = Base::solve(h, from, shorter == 0);
-      is_found = bool(outcome);
-      if (is_found) {
-        const StepController<double> wide = controller_;  // what is narrow does not shorten the steps elsewhere
-        const bool is_good = controller_.accepts(true, solver_.shape().of(h), h);
-        const bool sees_all = sees(longest, h);
-        if (!sees_all) controller_ = wide;
-        if (is_good && sees_all) {
-          outcome = accept(h, outcome);
-          if (!outcome) return outcome;
-          ++statistics_.steps;
-          if (is_cut) return outcome;
-          statistics_.count_chosen(h);
-          controller_.move_on(true, h, [&] { return solver_.tempo(); });
-          return outcome;
-        }
-        ++statistics_.rejected_steps;
-        outcome.status = Status::tolerance_not_met;
-      } else {
-        controller_.shrink(true, h, 0.5);
-        halved_ = std::min(halved_ + seldom, 2 * often);
-        if (shorter > 0 && --shorter == 0) controller_ = before;
-      }
-      const bool is_last = attempts == tries || outcome.status == Status::interrupted;
-      if (h < smallest_chosen * std::abs(time()) || is_last) return outcome;
+  double wanted() const { return std::min(controller_.step(), longest_); }
+  void keep() { read_member(); }
+  void restore() {
+    write_member();
+    look_ahead();
+  }
+
+  /// Forces that depend on time are looked at as if nothing cut the step short.
+  void look_ahead() { longest_ = solver_.followed(time(), controller_.step(), options_.tolerance); }
+
+  /// One whose error is too large predicts the stages of the next, shorter one.
+  Outcome try_step(double h, bool is_first) {
+    if (is_first) {
+      search_ = {controller_, halved_ > often ? 0 : fixed_point_worth};
+      halved_ = std::max(0, halved_ - 1);
     }
+    const PredictedFrom from = search_.is_found ? PredictedFrom::same_step : PredictedFrom::last_step;
+    Outcome outcome = Base::solve(h, from, search_.shorter == 0);
+    search_.is_found = bool(outcome);
+    if (outcome) {
+      const StepController<double> wide = controller_;  // what is narrow does not shorten the steps elsewhere
+      const bool is_good = controller_.accepts(true, solver_.shape().of(h), h);
+      const bool sees_all = sees(h);
+      if (!sees_all) controller_ = wide;
+      if (is_good && sees_all) return outcome;
+      ++statistics_.rejected_steps;
+      outcome.status = Status::tolerance_not_met;
+    } else {
+      controller_.shrink(true, h, 0.5);
+      halved_ = std::min(halved_ + seldom, 2 * often);
+      if (search_.shorter > 0 && --search_.shorter == 0) controller_ = search_.before;
+    }
+    return outcome;
   }
 
-  /// Whether the stages see what forces do between them. If not, `longest` becomes half of this step.
-  bool sees(double& longest, double h) {
+  Outcome take(const Outcome& found, bool is_cut) {
+    Outcome outcome = accept(found.step, found);
+    if (!outcome) return outcome;
+    ++statistics_.steps;
+    if (is_cut) return outcome;
+    statistics_.count_chosen(found.step);
+    controller_.move_on(true, found.step, [&] { return solver_.tempo(); });
+    return outcome;
+  }
+
+  /// Whether the stages see what forces do between them. If not, the next step is at most half of this one.
+  bool sees(double h) {
     if constexpr (requires { solver_.unseen(); }) {
       unseen_ = solver_.unseen();
       if (!statistics_.has_to_see(unseen_.impulse, h, options_.tolerance)) return true;
-      longest = h / 2;
+      longest_ = h / 2;
       return false;
     }
     return true;
   }
+
+  // --- A step of a given size ---
 
   /// One step of exactly h; on failure the state is what it was.
   Outcome attempt(double h, PredictedFrom from = PredictedFrom::last_step) {
@@ -366,7 +366,17 @@ class GaussStepper : private StepSolution<Solver> {
   using Base::controller_, Base::defect_, Base::options_, Base::solver_, Base::statistics_, Base::stop_, Base::time_,
       Base::traits_;
 
+  /// The search for a step: the controller before it, how many more failures of the fixed point it takes until Newton
+  /// may solve the step, and whether the last try was solved.
+  struct Search {
+    StepController<double> before;
+    int shorter;
+    bool is_found = false;
+  };
+
   Unseen unseen_;
+  double longest_ = 0;  // step that forces which depend on time allow
+  Search search_{controller_, fixed_point_worth};
   int halved_ = 0;  // `seldom` for each step that was not solved, less one for each since
   bool remembers_ = false, looks_ = false;
   Remembered before_;

@@ -24,8 +24,8 @@ class SystemForcing {
     double pace;
   };
 
-  /// The longest step up to h from the state that `look` returns, a Here. Sines on inputs turn in it by no more than
-  /// the stages integrate to the tolerance: they would not show that a weak sine turns often within a step.
+  /// The longest step up to h from the state that `look` returns, a Here. Within it, the phase of a sine input
+  /// changes by no more than the stages can integrate: they would miss a weak sine that turns often within a step.
   template <class Look>
   double followed(double h, double tolerance, Look&& look) {
     const SystemModel& model = at_times_.model();

@@ -10,7 +10,7 @@
 
 namespace pendula {
 
-/// The accuracy wanted of a run, for every row and event.
+/// The accuracy wanted of a run, for every row and event. What error it expects in the end, trust.hpp says.
 struct Accuracy {
   double error = 0;            ///< relative to the size and speed of the motion; 0: none, use the tolerance
   bool chooses_stages = true;  ///< by the tolerance; else the number of stages of the options is used

@@ -27,7 +27,7 @@ struct TangentMap {
   }
 };
 
-/// An integrator that goes from time to time and differentiates its steps.
+/// An integrator that steps to given times and differentiates its steps.
 class Differentiated {
  public:
   explicit Differentiated(const MotionTask& task)

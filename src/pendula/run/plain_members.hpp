@@ -49,7 +49,7 @@ class MemberWatch {
   MemberWatch& operator=(const MemberWatch&) = delete;
   virtual ~MemberWatch() = default;
 
-  /// Whether `after_step` is to be called, once for the steps of all lanes.
+  /// Whether `after_step` is to be called after each step, which all lanes take together.
   virtual bool wants_steps() const = 0;
   /// Whether `after_step` will ask for states at full order within steps (MemberSteps::at_full_order).
   virtual bool wants_looks() const = 0;

@@ -161,6 +161,8 @@ inline SecondLook coarser(const RunOptions& run, const Statistics& statistics, d
   const bool in_parts = statistics.rejected_steps > 0;
   const double longer = in_parts ? 3 : 2;
   look.options.step *= longer;
+  // The fixed point alone would divide the longer steps, perhaps into those of the run.
+  if (run.iteration == Iteration::fixed_point) look.options.iteration = Iteration::automatic;
   look.how = in_parts ? "with three times the step" : "with twice the step";
   const double less = std::pow(longer, run.method == Method::rk4 ? 4 : order_of(run)) - 1;
   look.factor = 1 / std::min(5.0, less);

@@ -9,8 +9,8 @@
 
 namespace pendula {
 
-/// Time-stepping method: implicit Gauss–Legendre; Radau IIA for stiff damping; explicit methods for comparison (paper
-/// §3.2).
+/// Time-stepping method. Implicit: Gauss–Legendre, and Radau IIA for stiff damping. The others are explicit: Taylor
+/// series, and Runge–Kutta methods for comparison (paper §3.2).
 enum class Method { gauss, radau, rk4, dopri5, fehlberg78, taylor };
 
 /// Form of the equations that Gauss–Legendre solves: (q, p) is symplectic, (q, q̇) is the paper's.

@@ -37,7 +37,7 @@ function drawLine(pen, points, isOverTime) {
   pen.stroke();
 }
 
-/// Draws rows at x(row), y(row), with gaps where one is no number, and where the angle with index `wrapped` of the two jumps.
+/// Draws the points x(row), y(row), with gaps where one is not finite, and where coordinate `wrapped` (0 or 1), an angle, jumps.
 function drawCurve(pen, axes, { from, to, stride = 1 }, x, y, { wrapped = -1, isOverTime = false } = {}) {
   let [piece, before] = [[], null];
   for (let row = from; row <= to; row += stride) {
