@@ -31,6 +31,8 @@ OF_MANY = (
     "call_arguments",
     "constraints",
     "constraint_rates",
+    "constraints_along",
+    "constraint_rates_along",
     "series_start_along",
     "series_next_along",
 )
@@ -87,8 +89,17 @@ class _Tables:
         composed = {
             "energies": self._energies,
             "acceleration_along": lambda: _along(self._one("acceleration"), ("q", "v")),
-            "momentum_form_along": self._momentum_form_along,
+            "momentum_form_along": lambda: self._slopes(
+                "momentum_form", ("parameters", "inputs"), ("dp", "df")
+            ),
         }
+        if self._kernel.model.constraints:
+            composed["constraints_along"] = lambda: self._slopes(
+                "constraints", ("parameters",), ("dg", "d_g_D_q")
+            )
+            composed["constraint_rates_along"] = lambda: self._slopes(
+                "constraint_rates", ("parameters",), ("d_g_dot",)
+            )
         # The factors of larger matrices, which series keep, have no derivative here.
         if len(self._kernel.system.coordinates) <= UNROLLED:
             composed["series_start_along"] = lambda: _along(start, ("parameters", "inputs", "state"))
@@ -126,11 +137,12 @@ class _Tables:
             found[given, 0] = value
         return TableFunction("energies", ("q", "v"), ("kinetic", "total"), tape.give(found))
 
-    def _momentum_form_along(self) -> TableFunction:
-        """The slopes only, without the values."""
-        whole, gives = _along(self._one("momentum_form"), ("parameters", "inputs")), ("dp", "df")
+    def _slopes(self, name: str, moved: tuple[str, ...], gives: tuple[str, ...]) -> TableFunction:
+        """Slopes of a function along what is moved, without its values."""
+        function = self._one(name)
+        whole = _along(function, moved)
         outputs = {row: value for row, value in whole.tape.outputs.items() if row[0] in gives}
-        takes = ("d_parameters", "d_inputs", "q", "v")
+        takes = (*map(_slope_of, moved), *function.takes)
         return replace(whole, takes=takes, gives=gives, tape=whole.tape.give(outputs))
 
 

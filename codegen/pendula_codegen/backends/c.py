@@ -10,13 +10,21 @@ from pendula_codegen.linear_solve import UNROLLED
 from pendula_codegen.table import CONDITIONS, KernelTable, TableFunction
 from pendula_codegen.tape import Row, Step, Tape, Value
 
-INTERFACE = 16  # system_interface of pendula/system/system_table.hpp
+INTERFACE = 17  # system_interface of pendula/system/system_table.hpp
 # Functions of one argument that are called for one number at a time.
 CALLS = {"acos", "asin", "atan", "cbrt", "cosh", "sinh", "sqrt", "tan", "tanh"}
 # Functions that steps do not call for these numbers of states: they are compiled for eight only, and others use those.
 SELDOM = {
     **dict.fromkeys(
-        ("acceleration_along", "momentum_form_along", "series_start_along", "series_next_along"), (1, 2, 4)
+        (
+            "acceleration_along",
+            "momentum_form_along",
+            "constraints_along",
+            "constraint_rates_along",
+            "series_start_along",
+            "series_next_along",
+        ),
+        (1, 2, 4),
     ),
     **dict.fromkeys(("momentum_from_velocity", "mass_matrix", "energies"), (2, 4)),
 }

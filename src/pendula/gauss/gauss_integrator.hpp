@@ -73,6 +73,10 @@ class GaussIntegrator : public PlainIntegrator {
     }
     return 0;
   }
+  int constraints() const override {
+    if constexpr (requires { stepper_.solver().constraints(); }) return stepper_.solver().constraints();
+    return 0;
+  }
   double resolved_decay(double error) const override {
     const SolverTraits traits = stepper_.solver().traits();
     return pendula::resolved_decay(traits.dissipates ? Family::radau : Family::gauss, traits.stages, error);

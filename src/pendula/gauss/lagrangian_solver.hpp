@@ -106,16 +106,23 @@ class LagrangianSolver : public StageIterations<LagrangianStages<Width, Form>> {
     return brought;
   }
 
+  /// Constraints that do not follow from others.
+  int constraints() const {
+    return stages_.is_constrained() ? static_cast<int>(stages_.constraints().independent()) : 0;
+  }
   /// How far the accepted step ended from the constraints, and their rates from 0.
   std::pair<double, double> constraint_errors() const { return stages_.constraint_errors(); }
 
   /// The derivative of the step that was solved and not yet accepted.
   using Tangent = LagrangianTangent<Width>;
-  Tangent make_tangent() const requires Form::is_symplectic {
-    require_no_constraints(stages_.info(), "derivatives: there are none yet");
-    return Tangent(stages_);
+  Tangent make_tangent() const requires Form::is_symplectic { return Tangent(stages_); }
+  void linearize(Tangent& tangent) {
+    if (stages_.is_constrained()) {
+      complete();
+      stages_.follow_constraints(true);
+    }
+    tangent.linearize(stages_);
   }
-  void linearize(Tangent& tangent) const { tangent.linearize(stages_); }
 
  private:
   using Base::choice_, Base::last_, Base::stages_;

@@ -205,8 +205,8 @@ class LagrangianStages : public SystemMotion<StagesInLanes<Eigen::Dynamic, doubl
   /// The stages, at their times.
   const SystemAt<Width>& at_stages() const { return dynamics_.stages(); }
 
-  /// From integrals of the rates of coordinates and momenta over the step, over h, makes `sums` what the stages lack of
-  /// them. What momenta lack on the way (`moments`) displaces coordinates.
+  /// On entry, `sums` are integrals of dq/dt and dp/dt over the step, over h; on return, by how much they exceed the
+  /// increments of the stages. The first moments of dp/dt (`moments`) correct coordinates.
   void take_changes(std::span<double> sums, std::span<const double> moments) const {
     for (std::size_t k = 0; k < count_; ++k) {
       double later = 0;
@@ -388,6 +388,14 @@ class LagrangianStages : public SystemMotion<StagesInLanes<Eigen::Dynamic, doubl
   /// Finds what constraints push at the end of the solved step.
   void finish_constraints() { constraints_->finish(state_.data(), U_.front().numbers()); }
 
+  /// Where the solved and finished step begins and ends, without full turns.
+  std::pair<Motion, Motion> ends() const {
+    find_rates(time_);
+    Motion begin = room_at(0);
+    Base::find_end(end_pushes());
+    return {std::move(begin), room_at(1)};
+  }
+
   /// Moves the state to the end of the step.
   void accept() {
     Base::move(true);
@@ -406,6 +414,12 @@ class LagrangianStages : public SystemMotion<StagesInLanes<Eigen::Dynamic, doubl
   Eigen::Index eigen_count() const { return index(count_); }
 
   double total(std::size_t k) const { return Columns::total(U_[k]); }
+
+  // What is in the room, at a share of the step.
+  Motion room_at(double share) const {
+    using Numbers = Eigen::Map<const Eigen::VectorXd>;
+    return {time_at(share), Numbers(room(0), eigen_count()), Numbers(room(2), eigen_count())};
+  }
 
   // --- Constraints, where the system has them ---
 

@@ -4,10 +4,12 @@
 #include <algorithm>
 #include <array>
 #include <cstddef>
+#include <optional>
 #include <pendula/gauss/lagrangian_direction.hpp>
 #include <pendula/gauss/lagrangian_jacobians.hpp>
 #include <pendula/gauss/lagrangian_stages.hpp>
 #include <pendula/gauss/stage_system.hpp>
+#include <pendula/system/constraint_tangents.hpp>
 #include <pendula/system/parameter_slopes.hpp>
 #include <pendula/system/system_model.hpp>
 #include <vector>
@@ -33,14 +35,21 @@ class LagrangianTangent {
       : columns_(stages.columns()),
         jacobians_(stages.count()),
         direction_(stages.count()),
-        system_(stages.count(), stages.stages()),
-        of_residuals_(system_.at(stages.count(), 0), 2 * eigen_count()),
+        system_(stages.count() + stages.info().constraints.size(), stages.stages()),
+        of_residuals_(system_.matrix.rows(), 2 * eigen_count()),
         residuals_(of_residuals_.rows(), 0),
         state_(2 * eigen_count(), 2 * eigen_count()),
         slopes_(stages.model()),
         of_parameters_(2 * eigen_count(), slopes_.p.cols()),
         from_(static_cast<std::size_t>(size()) * together),
-        to_(from_) {}
+        to_(from_) {
+    if (!stages.is_constrained()) return;
+    begin_.emplace(stages.model());
+    end_.emplace(stages.model());
+    const Eigen::Index of = std::ssize(stages.info().constraints), s = stages.stages();
+    nodes_ = {Eigen::MatrixXd(of, s), Eigen::MatrixXd(eigen_count(), s + 1), Eigen::MatrixXd(s, s), {}};
+    nodes_->times.resize(system_.stages() + 1);
+  }
 
   int size() const { return 2 * static_cast<int>(count()); }
   int parameters() const { return static_cast<int>(slopes_.p.cols()); }
@@ -52,6 +61,7 @@ class LagrangianTangent {
     direction_.linearize(stages);
     for (int i = 0; i < columns_.stages(); ++i) times_[static_cast<std::size_t>(i)] = stages.time_of(i);
     has_state_ = has_parameters_ = false;
+    if (nodes_) find_constrained(stages);
   }
 
   /// Replaces tangents at the start of the step, (size x count) row by row, by those at its end.
@@ -105,6 +115,21 @@ class LagrangianTangent {
     return total;
   }
 
+  // With constraints, the derivative of the step on them: its start and its end bring tangents there. What constraints
+  // know of the step is gone when it is accepted.
+  void find_constrained(const Stages& stages) {
+    constraints_ = &stages.constraints();
+    const auto [begin, end] = stages.ends();
+    nodes_->see(*constraints_, begin.q);
+    begin_->begin(begin.time, begin.q.data(), begin.v.data());
+    end_->end(end.time, end.q.data(), end.v.data(), constraints_->impulses_at_end().data());
+    curvature_at_start_ = begin_->curvature(nodes_->impulses.col(0).data());
+    find_state();
+    between_ = state_;
+    state_ = end_->whole() * between_ * begin_->whole();
+    constraints_ = nullptr;
+  }
+
   // Done only if more is asked for than a few tangents.
   void find_state() {
     if (has_state_) return;
@@ -116,11 +141,22 @@ class LagrangianTangent {
     for (std::size_t row = 0; row < count(); ++row) {
       for (std::size_t column = 0; column < count(); ++column) {
         const L forced = columns_.hb() * jacobians_.f_D_q(row, column);
+        L lacks = jacobians_.p_D_q(row, column) - columns_.integral(forced);
         state_(K + index(row), index(column)) += total(forced);
-        write(jacobians_.p_D_q(row, column) - columns_.integral(forced), residuals_, row, index(column));
+        if (constraints_ != nullptr) {
+          const auto more = constraints_->pushed_by_start(row, column, curvature_at_start_(index(row), index(column)));
+          state_(K + index(row), index(column)) += more.together;
+          lacks = lacks - more.pushed;
+        }
+        write(lacks, residuals_, row, index(column));
       }
       for (std::size_t i = 0; i < system_.stages(); ++i) {
         state_.col(K + index(row)) -= of_residuals_.row(system_.at(row, i)).transpose();
+      }
+    }
+    for (std::size_t i = 0; constraints_ != nullptr && i < constraints_->count(); ++i) {
+      for (std::size_t column = 0; column < count(); ++column) {
+        write(constraints_->slopes(i, column), residuals_, count() + i, index(column));
       }
     }
     state_.leftCols(K) += of_residuals_.transpose().lazyProduct(residuals_);
@@ -139,15 +175,44 @@ class LagrangianTangent {
           jacobians_.f_D_v(row, column).store(forced);
           const L through_q = (columns_.hb() * columns_.ha(k)) * jacobians_.f_D_q(row, column);
           of_residuals_(unknown, K + index(row)) = -(columns_.hb(k) * forced[k] + total(through_q));
-          alignas(pack_alignment) typename Stages::Stored derivative;
-          jacobians_.derivative(columns_, row, column, k).store(derivative);
-          for (std::size_t i = 0; i < system_.stages(); ++i) {
-            system_.matrix(unknown, system_.at(row, i)) = derivative[i];
+          L derivative = jacobians_.derivative(columns_, row, column, k);
+          if (constraints_ != nullptr) {
+            const L hb(columns_.hb(k));
+            derivative = derivative - hb * constraints_->pushed_by_increment(row, column, k);
+            of_residuals_(unknown, K + index(row)) -=
+                columns_.hb(k) * constraints_->pushed_by_increment_together(row, column, k);
           }
+          set_derivatives(row, unknown, derivative);
         }
       }
     }
+    if (constraints_ != nullptr) find_response_of_constraints();
     system_.solve(of_residuals_.data(), 2 * K);
+  }
+
+  // As in lagrangian_newton.hpp.
+  void find_response_of_constraints() {
+    for (std::size_t i = 0; i < constraints_->count(); ++i) {
+      for (std::size_t k = 0; k < system_.stages(); ++k) {
+        const Eigen::Index impulse = system_.at(count() + i, k);
+        for (std::size_t row = 0; row < count(); ++row) {
+          set_derivatives(count() + i, system_.at(row, k), L(columns_.hb(k)) * constraints_->lacking_by(i, row, k));
+          set_derivatives(row, impulse, L(0.0) - constraints_->pushed_by(row, i, k));
+          of_residuals_(impulse, eigen_count() + index(row)) = -constraints_->slope(k, i, row);
+        }
+        for (std::size_t j = 0; j < constraints_->count(); ++j) {
+          const L soft = L(i == j ? constraints_->softness(i) : 0.0) * columns_.unit(k);
+          set_derivatives(count() + j, impulse, soft);
+        }
+      }
+    }
+  }
+
+  // The derivatives of the residuals `row` at all stages by an unknown; the matrix is transposed.
+  void set_derivatives(std::size_t row, Eigen::Index unknown, const L& lanes) {
+    alignas(pack_alignment) typename Stages::Stored numbers;
+    lanes.store(numbers);
+    for (std::size_t i = 0; i < system_.stages(); ++i) system_.matrix(unknown, system_.at(row, i)) = numbers[i];
   }
 
   // Done only if derivatives by parameters are asked for.
@@ -172,7 +237,34 @@ class LagrangianTangent {
         residuals_.row(system_.at(row, at)) = momenta[at].row(index(row));
       }
     }
+    if (nodes_) add_constraints_by_parameters();
     of_parameters_ += of_residuals_.transpose().lazyProduct(residuals_);
+    if (!nodes_) return;
+    of_parameters_ += between_ * begin_->by_parameters();
+    of_parameters_ = (end_->whole() * of_parameters_).eval();
+    of_parameters_ += end_->by_parameters();
+  }
+
+  // What constraints lack at the nodes 1 … s, and push at the nodes 0 … s − 1.
+  void add_constraints_by_parameters() {
+    const Eigen::Index K = eigen_count(), stages = index(system_.stages());
+    for (Eigen::Index node = 0; node <= stages; ++node) {
+      const double* const place = nodes_->places.col(node).data();
+      slopes_.evaluate_constraints(nodes_->times[static_cast<std::size_t>(node)], place, place);
+      for (Eigen::Index i = 0; node > 0 && i < slopes_.g.rows(); ++i) {
+        residuals_.row(system_.at(count() + static_cast<std::size_t>(i), static_cast<std::size_t>(node - 1))) =
+            slopes_.g.row(i);
+      }
+      if (node == stages) break;
+      const Eigen::MatrixXd turned = slopes_.turned(nodes_->impulses.col(node));
+      of_parameters_.bottomRows(K) += turned;
+      for (Eigen::Index i = 0; i < stages; ++i) {
+        for (std::size_t row = 0; row < count(); ++row) {
+          residuals_.row(system_.at(row, static_cast<std::size_t>(i))) -=
+              nodes_->push(i, node) * turned.row(index(row));
+        }
+      }
+    }
   }
 
   // y += A x, row by row. A row has one number for each direction.
@@ -213,6 +305,36 @@ class LagrangianTangent {
   std::array<double, static_cast<std::size_t>(Width)> times_{};
   bool has_state_ = false;
   bool has_parameters_ = false;
+
+  /// Constraints at the nodes of the step: impulses (constraints x s) at 0 … s − 1, coordinates and times at 0 … s, and
+  /// what a push at each node adds to momenta at the stages (s x s).
+  struct Nodes {
+    Eigen::MatrixXd impulses, places, push;
+    std::vector<double> times;
+
+    void see(const StageConstraints<Width>& constraints, const Eigen::VectorXd& start) {
+      const Eigen::Index stages = push.cols();
+      for (Eigen::Index node = 0; node <= stages; ++node) {
+        const auto at = static_cast<std::size_t>(node);
+        times[at] = constraints.time_of(at);
+        for (Eigen::Index k = 0; k < places.rows(); ++k) {
+          places(k, node) = node == 0 ? start[k] : constraints.place(static_cast<std::size_t>(k), at);
+        }
+        if (node == stages) break;
+        for (Eigen::Index i = 0; i < impulses.rows(); ++i) {
+          impulses(i, node) = constraints.impulse(static_cast<std::size_t>(i), at);
+        }
+        alignas(pack_alignment) typename Stages::Stored added;
+        constraints.push(at).store(added);
+        for (Eigen::Index i = 0; i < stages; ++i) push(i, node) = added[i];
+      }
+    }
+  };
+  std::optional<ConstraintTangents> begin_, end_;
+  std::optional<Nodes> nodes_;
+  const StageConstraints<Width>* constraints_ = nullptr;  // while linearize runs
+  Directions<> curvature_at_start_;
+  Eigen::MatrixXd between_;  // the derivative of the step without what its ends do
 };
 
 }  // namespace pendula

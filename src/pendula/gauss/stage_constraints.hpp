@@ -58,6 +58,8 @@ class StageConstraints {
         responses_(static_cast<Eigen::Index>(lacking_.size())) {}
 
   std::size_t count() const { return count_; }
+  /// How many do not follow from others, where it looked last.
+  std::size_t independent() const { return start_.independent(); }
 
   /// Adds to accelerations what constraints bring in a state.
   void accelerate(double time, const double* q, const double* v, double* a) {
@@ -155,6 +157,40 @@ class StageConstraints {
     return softest * h_ * sum;
   }
   void correct(std::size_t i, std::size_t node, double by) { impulses_[i][node] -= by; }
+
+  // --- For the derivative of a step that is solved and finished, after linearize ---
+
+  /// The impulses at the nodes 0 … s − 1, and at the end; and coordinates at the nodes 1 … s.
+  double impulse(std::size_t i, std::size_t node) const { return impulses_[i][node]; }
+  std::span<const double> impulses_at_end() const { return last_; }
+  double place(std::size_t k, std::size_t node) const { return places_[k][node - 1]; }
+  double time_of(std::size_t node) const { return time_ + h_ * nodes_.d(node); }
+  /// What a push at a node adds to momenta at the stages.
+  L push(std::size_t node) const { return nodes_.push(node); }
+  /// What pushes coordinate k at the nodes 0 … s − 1 changes by, where coordinate l at the start does, and everything
+  /// with it. `at_start` is Σ_i J_i ∂²g_i/∂q_k ∂q_l at node 0.
+  struct ByStart {
+    L pushed;         ///< at the stages
+    double together;  ///< at the end
+  };
+  ByStart pushed_by_start(std::size_t k, std::size_t l, double at_start) const {
+    alignas(pack_alignment) double numbers[width] = {};
+    numbers[0] = at_start;
+    for (std::size_t m = 1; m < nodes_.stages(); ++m) numbers[m] = curvature_[k * coordinates_ + l][m - 1];
+    return {nodes_.pushed(numbers), total(numbers)};
+  }
+  /// The same at the end, by an increment of coordinate l at stage j.
+  double pushed_by_increment_together(std::size_t k, std::size_t l, std::size_t j) const {
+    double sum = 0;
+    for (std::size_t m = 1; m < nodes_.stages(); ++m)
+      sum += curvature_[k * coordinates_ + l][m - 1] * nodes_.reach(j, m);
+    return sum;
+  }
+  /// The slope of constraint i by coordinate k at a node; at the nodes 1 … s.
+  double slope(std::size_t node, std::size_t i, std::size_t k) const {
+    return node == 0 ? start_.slope(i, k) : slopes_[i * coordinates_ + k][node - 1];
+  }
+  L slopes(std::size_t i, std::size_t k) const { return L::load(slopes_[i * coordinates_ + k]); }
 
   /// What rounding of coordinates, by way of the constraints, makes of increments; as changes are weighed.
   double rounding() const { return rounding_; }
@@ -279,10 +315,6 @@ class StageConstraints {
     return std::max(std::abs(q[k]), at_nodes_.model().info().is_angle[k] ? 1.0 : 0.0);
   }
 
-  double slope(std::size_t node, std::size_t i, std::size_t k) const {
-    return node == 0 ? start_.slope(i, k) : slopes_[i * coordinates_ + k][node - 1];
-  }
-
   // How constraints at the nodes respond to impulses at others, with the slopes that are predicted there, and the
   // masses in the middle; inverted.
   void find_inverse() {
@@ -315,18 +347,11 @@ class StageConstraints {
     responses_.find(inverse_.data());
   }
 
-  // Σ_i J_i ∂²g_i/∂q_k ∂q_l at the nodes 1 … s − 1: second rates without accelerations are vᵀ g'' v, but for what is
-  // linear in v or does not depend on it.
+  // Σ_i J_i ∂²g_i/∂q_k ∂q_l at the nodes 1 … s − 1.
   void find_curvature() {
-    const L none = curved(coordinates_, coordinates_);
-    for (std::size_t k = 0; k < coordinates_; ++k) {
-      const L of_k = curved(k, coordinates_);
-      for (std::size_t l = 0; l <= k; ++l) {
-        const L half = L(0.5) * ((curved(k, l) - of_k) + (none - curved(l, coordinates_)));
-        half.store(curvature_[k * coordinates_ + l]);
-        half.store(curvature_[l * coordinates_ + k]);
-      }
-    }
+    take_second_derivatives(
+        coordinates_, [&](std::size_t k, std::size_t l) { return curved(k, l); },
+        [&](std::size_t k, std::size_t l, const L& second) { second.store(curvature_[k * coordinates_ + l]); });
   }
   // Σ_i J_i d²g_i/dt² there, where only the coordinates k and l move, at a rate of 1; of 2, where they are the same.
   L curved(std::size_t k, std::size_t l) {

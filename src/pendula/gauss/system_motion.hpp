@@ -204,12 +204,16 @@ class SystemMotion {
   Balance balance(const Num& brought, std::span<const double> pushes = {}) const {
     find_rates(time_);
     const Energies start = energies(time_);
+    find_end(pushes);
+    return {brought, start, energies(time_ + columns_.h())};
+  }
+
+  // Writes the end of the solved step to the room, as find_rates does its start.
+  void find_end(std::span<const double> pushes) const {
     const auto end = [&](std::size_t k) { return (state_[k].compensation + Columns::total(U_[k])) + state_[k].value; };
     for (std::size_t k = 0; k < 2 * count_; ++k) to_row(Num(end(k)), room(0, k));
     for (std::size_t k = 0; k < pushes.size(); ++k) to_row(from_row<Num>(room(1, k)) + Num(pushes[k]), room(1, k));
-    const Num then = time_ + columns_.h();
-    rates_of_room(then);
-    return {brought, start, energies(then)};
+    rates_of_room(time_ + columns_.h());
   }
 
   // --- A step ---

@@ -5,6 +5,7 @@
 #include <pendula/run/derivatives.hpp>
 #include <pendula/run/schedule.hpp>
 #include <pendula/run/subject_kinds.hpp>
+#include <pendula/system/constraint_forces.hpp>
 #include <pendula/system/lagrangian_variation.hpp>
 #include <stdexcept>
 #include <utility>
@@ -108,6 +109,12 @@ void find_accelerations(const SystemSubject& subject, const Motion& motion, doub
   SystemAt<1> here(system_model_of(subject, motion));
   here.set_time(motion.time);
   here(&SystemFunctions::acceleration, motion.q.data(), motion.v.data(), found);
+  if (subject.info().constraints.empty()) return;
+  ConstraintForces forces(subject.info());
+  Eigen::VectorXd lambda(static_cast<Eigen::Index>(forces.count()));
+  forces.look(here, motion.q.data());
+  forces.find(here, motion.q.data(), motion.v.data(), found, lambda.data());
+  forces.move(lambda.data(), found);
 }
 
 template <class Space>

@@ -117,6 +117,10 @@ class Integrator : public StepView {
         "ten coordinates; other steps have no derivative");
   }
 
+  /// Constraints that do not follow from others in the state: each takes a coordinate and a rate from the motions that
+  /// there are nearby.
+  int constraints() const { return integrator_->constraints(); }
+
   /// The largest z for which a step multiplies a tangent that decays as e^(−z) correctly to `error` in z; valid after
   /// linearize().
   double resolved_decay(double error) const { return integrator_->resolved_decay(error); }

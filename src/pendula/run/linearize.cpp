@@ -7,6 +7,7 @@
 #include <pendula/run/derivatives.hpp>
 #include <pendula/run/linearize.hpp>
 #include <pendula/run/subject_kinds.hpp>
+#include <pendula/system/no_constraints.hpp>
 #include <pendula/system/parameter_slopes.hpp>
 #include <pendula/system/system_model.hpp>
 #include <stdexcept>
@@ -73,6 +74,7 @@ void linearize(const Subject& subject, const Motion& motion, double* a, double* 
   require_regular(subject, motion);
   const SystemModel model =
       as_its_kind_at(subject, motion.time, [&](const auto& kind) { return system_model_of(kind, motion); });
+  require_no_constraints(model.info(), "linearization: expected a system whose coordinates are free");
   if (a != nullptr) {
     SystemAt<8> here(model);
     here.set_time(motion.time);

@@ -79,10 +79,25 @@ struct TangentScale {
 /// Finds the scales from the derivative of a tiny step, which `integrator` has taken afterwards; nothing if it fails.
 /// `rows` as from Integrator::linearize.
 std::optional<TangentScale> tangent_scale(Integrator& integrator, const Motion& start, int rows, double duration) {
-  const double h = std::max(1e-10 * duration, 1e-12 * std::abs(start.time));
+  double h = std::max(1e-10 * duration, 1e-12 * std::abs(start.time));
   TangentScale scale{Eigen::VectorXd::Ones(rows), 1};
-  integrator.start(start);
-  if (!(h > 0) || !integrator.step(h)) return {};
+  // Relative to a radian, or to larger lengths.
+  const Eigen::ArrayXd sizes = start.q.array().abs().max(1);
+  const double turning = (start.v.array().abs() / sizes).maxCoeff();
+  double pushed = 0;
+  const auto goes = [&] {
+    integrator.start(start);
+    if (!(h > 0) || !integrator.step(h)) return false;
+    pushed = ((integrator.state().v - start.v).array().abs() / sizes).maxCoeff() / h;
+    return true;
+  };
+  if (!goes()) return {};
+  if (integrator.constraints() > 0) {  // their impulses are rounding in a tiny step
+    constexpr double part = 1e-4;
+    const double rate = std::sqrt(std::max(turning * turning, pushed));
+    h = rate * duration > part ? part / rate : duration;
+    if (!goes()) return {};
+  }
   const Eigen::Index half = rows / 2;
   // Momenta that move a coordinate: their inverse mass. In space a link has three components, one of which, along the
   // link, moves nothing; they share the largest.
@@ -101,10 +116,14 @@ std::optional<TangentScale> tangent_scale(Integrator& integrator, const Motion& 
     mobility[of] = std::abs(column[of]) / h;
     kept[of] = column[half + of];
   });
-  double loss = 0;  // decay rate of momenta by damping; the sum over a group tells its number of directions
+  double loss = 0;  // decay rate of momenta by damping; the sum over a group, or over all that constraints mix, tells
+                    // its number of directions
   for (Eigen::Index first = 0; first < half; first += group) {
     mobility.segment(first, group).setConstant(mobility.segment(first, group).maxCoeff());
-    const double sum = kept.segment(first, group).sum(), whole = std::max(1.0, std::round(sum));
+  }
+  const Eigen::Index together = integrator.constraints() > 0 ? half : group;
+  for (Eigen::Index first = 0; first < half; first += together) {
+    const double sum = kept.segment(first, together).sum(), whole = std::max(1.0, std::round(sum));
     loss = std::max(loss, std::abs(whole - sum) / (whole * h));
   }
   const Eigen::VectorXd lightness = mobility.cwiseSqrt();
@@ -113,11 +132,6 @@ std::optional<TangentScale> tangent_scale(Integrator& integrator, const Motion& 
     const double push = column.tail(half).cwiseAbs().cwiseProduct(lightness).maxCoeff();
     swing = std::max(swing, push * lightness[of] / h);
   });
-  // Relative to a radian, or to larger lengths.
-  const Eigen::ArrayXd sizes = start.q.array().abs().max(1);
-  const Motion moved = integrator.state();
-  const double turning = (start.v.array().abs() / sizes).maxCoeff();
-  const double pushed = ((moved.v - start.v).array().abs() / sizes).maxCoeff() / h;
   const double squared = std::max({swing, pushed, turning * turning, loss * loss});
   if (std::isfinite(squared) && squared > 0) scale.rate = std::sqrt(squared);
   if (mobility.allFinite() && (mobility.array() > 0).all()) {
@@ -214,7 +228,8 @@ void LyapunovTangents::make_orthonormal() {
 LyapunovRun find_lyapunov_spectrum(Integrator& integrator, const Motion& start, double step, double duration, int count,
                                    const std::function<void(const LyapunovProgress&)>& on_way,
                                    const std::function<bool()>& stop) {
-  const int all = 2 * static_cast<int>(start.q.size());
+  integrator.start(start);
+  const int all = 2 * (static_cast<int>(start.q.size()) - integrator.constraints());
   if (count < 0 || count > all) {
     throw std::invalid_argument("count: expected 1 to " + std::to_string(all) + " exponents, got " +
                                 std::to_string(count));

@@ -8,7 +8,6 @@
 #include <pendula/run/no_kernel.hpp>
 #include <pendula/run/subject.hpp>
 #include <pendula/run/system_subject.hpp>
-#include <pendula/system/no_constraints.hpp>
 #include <pendula/system/system_model.hpp>
 #include <stdexcept>
 #include <string>
@@ -52,15 +51,12 @@ SystemModel system_model_of(const ChainSubject<Space>& subject) {
                  " links in this build; its linearization needs one");
 }
 
-/// Throws std::invalid_argument where derivatives would leave constraints.
 inline SystemModel system_model_of(const SystemSubject& subject) {
-  require_no_constraints(subject.info(), "derivatives: there are none yet");
   return {subject.table(), subject.numbers().plain()};
 }
 
 /// The system of a subject. Functions of several pieces are on the pieces that `motion` takes.
 inline SystemModel system_model_of(const SystemSubject& subject, const Motion& motion) {
-  require_no_constraints(subject.info(), "derivatives: there are none yet");
   return {subject.table(), subject.numbers_at(motion).plain()};
 }
 template <class Space>

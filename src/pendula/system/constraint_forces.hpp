@@ -10,6 +10,22 @@
 
 namespace pendula {
 
+/// Second derivatives of a function of n coordinates from its second rates, of which rate(k, l) is the one where only
+/// the coordinates k and l move, at a rate of 1; of 2 where they are the same; n stands for none. What is linear in
+/// rates, or does not depend on them, drops out. Calls take(k, l, ∂²/∂q_k ∂q_l) for all pairs.
+template <class Rate, class Take>
+void take_second_derivatives(std::size_t n, Rate rate, Take take) {
+  const auto none = rate(n, n);
+  for (std::size_t k = 0; k < n; ++k) {
+    const auto of_k = rate(k, n);
+    for (std::size_t l = 0; l <= k; ++l) {
+      const auto found = decltype(of_k)(0.5) * ((rate(k, l) - of_k) + (none - rate(l, n)));
+      take(k, l, found);
+      if (l != k) take(l, k, found);
+    }
+  }
+}
+
 /// Constraints g(q, t) = 0 of a system at one place, and forces Gᵀ λ, G = ∂g/∂q, by which they hold there:
 ///   K λ = −(G a + d²g/dt² without accelerations),  K = G M⁻¹ Gᵀ,  a the accelerations without them.
 /// Where constraints follow from others, λ is one of many, and Gᵀ λ is the same for all.
@@ -24,12 +40,14 @@ class ConstraintForces {
         inverse_(count_ * count_),
         rates_(count_),
         second_(count_),
+        moving_(coordinates_),
         masses_(static_cast<Eigen::Index>(coordinates_)),
         softness_(static_cast<Eigen::Index>(count_)) {}
 
   std::size_t count() const { return count_; }
-  /// Whether constraints follow from others there.
-  bool depend() const { return depend_; }
+  /// How many do not follow from others there.
+  std::size_t independent() const { return independent_; }
+  bool depend() const { return independent_ < count_; }
 
   /// Goes to q  (coordinates).
   void look(const SystemAt<1>& here, const double* q) {
@@ -44,7 +62,7 @@ class ConstraintForces {
         softness_.matrix(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j)) = sum;
       }
     }
-    depend_ = softness_.find(inverse_.data());
+    independent_ = static_cast<std::size_t>(softness_.find(inverse_.data()));
   }
 
   /// g, ∂g/∂q, M⁻¹ (∂g/∂q)ᵀ, K⁻¹ there.
@@ -77,6 +95,38 @@ class ConstraintForces {
   /// dg/dt in the state that stop was called with.
   double rate(std::size_t i) const { return rates_[i]; }
 
+  /// Σ_i J_i ∂²g_i/∂q² at q for impulses J  (coordinates x coordinates).
+  void find_curvature(const SystemAt<1>& here, const double* q, const double* impulses, double* found) {
+    const auto rate = [&](std::size_t k, std::size_t l) {
+      for (std::size_t i = 0; i < coordinates_; ++i) moving_[i] = (i == k ? 1.0 : 0.0) + (i == l ? 1.0 : 0.0);
+      here(&SystemFunctions::constraint_rates, q, moving_.data(), rates_.data(), second_.data());
+      double sum = 0;
+      for (std::size_t i = 0; i < count_; ++i) sum += impulses[i] * second_[i];
+      return sum;
+    };
+    take_second_derivatives(coordinates_, rate,
+                            [&](std::size_t k, std::size_t l, double second) { found[k * coordinates_ + l] = second; });
+  }
+
+  /// The derivative of dg/dt by q, in the state q, v  (count x coordinates): of second rates, vᵀ g'' v + 2 v·∂g'/∂t +
+  /// …, it is a fourth of what they change by from v − e to v + e.
+  void find_rates_by_place(const SystemAt<1>& here, const double* q, const double* v, double* found) {
+    double speed = 0;
+    for (std::size_t k = 0; k < coordinates_; ++k) speed = std::max(speed, std::abs(v[k]));
+    if (speed == 0) speed = 1;
+    for (std::size_t k = 0; k < coordinates_; ++k) {
+      for (const double side : {1.0, -1.0}) {
+        std::copy_n(v, coordinates_, moving_.begin());
+        moving_[k] += side * speed;
+        here(&SystemFunctions::constraint_rates, q, moving_.data(), rates_.data(), second_.data());
+        for (std::size_t i = 0; i < count_; ++i) {
+          double& entry = found[i * coordinates_ + k];
+          entry = (side > 0 ? 0 : entry) + side * second_[i] / (4 * speed);
+        }
+      }
+    }
+  }
+
  private:
   void resist(const std::vector<double>& changes, double* found) const {
     for (std::size_t i = 0; i < count_; ++i) {
@@ -89,10 +139,10 @@ class ConstraintForces {
   std::vector<double> values_, slopes_;
   std::vector<double> moved_;    // M⁻¹ Gᵀ, constraint by constraint
   std::vector<double> inverse_;  // of K
-  std::vector<double> rates_, second_;
+  std::vector<double> rates_, second_, moving_;
   LinearSystem masses_;
   GeneralInverse softness_;
-  bool depend_ = false;
+  std::size_t independent_ = 0;
 };
 
 }  // namespace pendula

@@ -84,6 +84,10 @@ constexpr std::array<Signature, Program::many + Program::plain + Program::series
     {"call_arguments", 2, {q, v, {"found", Rows::arguments}}},
     {"constraints", 1, {q, {"g", Rows::constraints}, {"g_D_q", Rows::constraint_slopes}}},
     {"constraint_rates", 2, {q, v, {"g_dot", Rows::constraints}, {"g_ddot", Rows::constraints}}},
+    {"constraints_along",
+     2,
+     {{{"d_parameters", Rows::parameters}, q, {"dg", Rows::constraints}, {"d_g_D_q", Rows::constraint_slopes}}}},
+    {"constraint_rates_along", 3, {{{"d_parameters", Rows::parameters}, q, v, {"d_g_dot", Rows::constraints}}}},
     {"series_start_along",
      5,
      {{{"unit", Rows::one},
@@ -320,7 +324,9 @@ class OwnedKernel {
     for (SystemFunctions* of : {&table_.of_1, &table_.of_2, &table_.of_4, &table_.of_8}) {
       if (lacks_tangents) of->series_start_along = nullptr, of->series_next_along = nullptr;
       if (info.argument_is_base.empty()) of->call_arguments = nullptr;
-      if (info.constraints.empty()) of->constraints = nullptr, of->constraint_rates = nullptr;
+      if (!info.constraints.empty()) continue;
+      of->constraints = nullptr, of->constraint_rates = nullptr;
+      of->constraints_along = nullptr, of->constraint_rates_along = nullptr;
     }
     if (info.switches.empty()) table_.plain.switches = nullptr;
     if (info.points.empty()) table_.plain.positions = nullptr, table_.plain.velocities = nullptr;

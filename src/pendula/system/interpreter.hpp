@@ -30,9 +30,10 @@ class Interpreter : NumbersOfStates<W> {
 
  public:
   static constexpr SystemFunctions functions() {
-    return {&call<0>,  &call<1>,  &call<2>,  &call<3>,  &call<4>,      &call<5>,    &call<6>,
-            &call<7>,  &call<8>,  &call<9>,  &call<10>, &call<11>,     &call<12>,   &call<13>,
-            &call<14>, &call<15>, &call<16>, &iterate,  &series_start, &series_next};
+    return []<std::size_t... which>(std::index_sequence<which...>) {
+      return SystemFunctions{&call<which>..., &iterate, &series_start, &series_next};
+    }
+    (std::make_index_sequence<Program::many>());
   }
   static constexpr PlainFunctions plain_functions() {
     constexpr std::size_t first = Program::many;

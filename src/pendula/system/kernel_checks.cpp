@@ -81,6 +81,8 @@ class Widths {
     if (const std::size_t count = table_.info.constraints.size(); count > 0) {
       compare(&Of::constraints, {&q_}, {count, count * n_});
       compare(&Of::constraint_rates, {&q_, &v_}, {count, count});
+      compare(&Of::constraints_along, {&parameters_, &q_}, {count, count * n_});
+      compare(&Of::constraint_rates_along, {&parameters_, &q_, &v_}, {count});
     }
     compare_iteration(1);
     for (const std::size_t width : widths) compare_iteration(width);

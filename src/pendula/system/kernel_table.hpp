@@ -51,6 +51,8 @@ class KernelFunctions : KernelNumbers<S, W> {
             tells_arguments<S> ? &call_arguments : nullptr,
             has_constraints<S> ? &constraints : nullptr,
             has_constraints<S> ? &constraint_rates : nullptr,
+            has_constraints<S> ? &constraints_along : nullptr,
+            has_constraints<S> ? &constraint_rates_along : nullptr,
             has_series<S> && W == 8 ? &KernelSeries<S, W>::start_along : nullptr,
             has_series<S> && W == 8 ? &KernelSeries<S, W>::next_along : nullptr,
             &iterate,
@@ -200,19 +202,47 @@ class KernelFunctions : KernelNumbers<S, W> {
   }
   static void momentum_form_along(const Conditions& at, const double* varied_parameters, const double* varied_inputs,
                                   const double* q, const double* v, double* dp, double* df) {
-    const Vector<L> places = vector(q), rates = vector(v);
-    Vector<Dual<L>> fixed_q, fixed_v, momenta, forces;
-    for (Eigen::Index k = 0; k < places.size(); ++k) {
-      fixed_q[k] = Dual<L>(places[k]);
-      fixed_v[k] = Dual<L>(rates[k]);
-    }
+    Vector<Dual<L>> momenta, forces;
     S::momentum_form(Crossing::template read_parameters<Dual<L>>(VariedRows{at.parameters, varied_parameters}, at),
-                     fixed_q, fixed_v, Crossing::template read<Inputs<Dual<L>>>(VariedRows{at.inputs, varied_inputs}),
-                     momenta, forces);
+                     unvaried(q), unvaried(v),
+                     Crossing::template read<Inputs<Dual<L>>>(VariedRows{at.inputs, varied_inputs}), momenta, forces);
     for (Eigen::Index k = 0; k < momenta.size(); ++k) {
       store(momenta[k].slope, dp + k * W);
       store(forces[k].slope, df + k * W);
     }
+  }
+
+  static void constraints_along(const Conditions& at, const double* varied_parameters, const double* q, double* dg,
+                                double* dg_D_q) {
+    if constexpr (has_constraints<S>) {
+      typename S::template Constraints<Dual<L>> found;
+      typename S::template ConstraintSlopes<Dual<L>> slopes;
+      S::constraints(Crossing::template read_parameters<Dual<L>>(VariedRows{at.parameters, varied_parameters}, at),
+                     unvaried(q), found, slopes);
+      for (Eigen::Index i = 0; i < found.rows(); ++i) {
+        store(found(i, 0).slope, dg + i * W);
+        for (Eigen::Index k = 0; k < slopes.cols(); ++k) {
+          store(slopes(i, k).slope, dg_D_q + (i * slopes.cols() + k) * W);
+        }
+      }
+    }
+  }
+  static void constraint_rates_along(const Conditions& at, const double* varied_parameters, const double* q,
+                                     const double* v, double* dg_dot) {
+    if constexpr (has_constraints<S>) {
+      typename S::template Constraints<Dual<L>> first, second;
+      S::constraint_rates(Crossing::template read_parameters<Dual<L>>(VariedRows{at.parameters, varied_parameters}, at),
+                          unvaried(q), unvaried(v), first, second);
+      for (Eigen::Index i = 0; i < first.rows(); ++i) store(first(i, 0).slope, dg_dot + i * W);
+    }
+  }
+
+  /// Coordinates or rates that do not vary.
+  static Vector<Dual<L>> unvaried(const double* numbers) {
+    const Vector<L> given = vector(numbers);
+    Vector<Dual<L>> found;
+    for (Eigen::Index k = 0; k < given.size(); ++k) found[k] = Dual<L>(given[k]);
+    return found;
   }
 
   // --- The iteration, compiled with the kernel: for few coordinates a call of its functions would cost as much ---

@@ -60,6 +60,9 @@ class PlainIntegrator {
   /// generated kernel (δq, δp).
   virtual int linearize() { return 0; }
 
+  /// Constraints that do not follow from others in the state.
+  virtual int constraints() const { return 0; }
+
   /// The largest z for which a step multiplies a tangent that decays as e^(−z) correctly to `error` in z. For methods
   /// with a derivative.
   virtual double resolved_decay(double /*error*/) const { return 0; }

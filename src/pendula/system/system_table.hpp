@@ -66,11 +66,14 @@ struct SystemFunctions {
                               double* df);
   /// Arguments of the model's functions, (arguments, W) (field_look.hpp); null if the kernel does not provide them.
   void (*call_arguments)(const Conditions&, Numbers q, Numbers v, double* found);
-  /// What is 0 at all times, g(q, t), (constraints, W), and ∂g/∂q; forces (∂g/∂q)ᵀ λ keep it so. This and the next one
-  /// are null without constraints.
+  /// What is 0 at all times, g(q, t), (constraints, W), and ∂g/∂q; forces (∂g/∂q)ᵀ λ keep it so. This and the next
+  /// three are null without constraints.
   void (*constraints)(const Conditions&, Numbers q, double* g, double* g_D_q);
   /// dg/dt, and d²g/dt² where nothing accelerates.
   void (*constraint_rates)(const Conditions&, Numbers q, Numbers v, double* g_dot, double* g_ddot);
+  /// Derivatives of g and ∂g/∂q, and of dg/dt, along a variation of parameters.
+  void (*constraints_along)(const Conditions&, Numbers parameters, Numbers q, double* dg, double* dg_D_q);
+  void (*constraint_rates_along)(const Conditions&, Numbers parameters, Numbers q, Numbers v, double* dg_dot);
   /// Orders of Taylor series, and how they change where parameters, inputs and states do: series_start, and one order k
   /// of series_next, whose `order` is (k, 1/k, unit/(k + 1), time), (4, W), and whose `sums` are Σ A_j B_(k−j),
   /// (SeriesInfo::sums, W); inputs are those of order k. Rows of `state`, `next` and `operands` are those of W motions.
@@ -121,6 +124,6 @@ const SystemFunctions& functions_of(const SystemTable& table) {
 }
 
 /// Version of the layout that crosses to a separately compiled kernel: SystemTable and everything that it points to.
-inline constexpr int system_interface = 16;
+inline constexpr int system_interface = 17;
 
 }  // namespace pendula
