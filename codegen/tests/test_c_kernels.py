@@ -209,6 +209,11 @@ class Truth:
                     "g_dot": said("constraint_rates", at),
                     "g_ddot": said("constraint_second_rates", at),
                 }
+            case "constraints_along" | "constraint_rates_along":
+                slope = self._slope(function.removesuffix("_along"), at, {"parameters": "d_parameters"})
+                if function == "constraints_along":
+                    return {"dg": slope["g"], "d_g_D_q": slope["g_D_q"]}
+                return {"d_g_dot": slope["g_dot"]}
             case "switches":
                 return {"g": self._values("switches", [s.value for s in self.model.switches], at)}
             case "positions":
