@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import builtins
 import keyword
+import math
 import random
 import re
 import sys
@@ -508,21 +509,22 @@ class Model:
                 raise GenerationError(
                     f"{where}: lagrangian: expected powers of the rates up to 2, got others of {rate_name(q.name)}"
                 )
-        if _is_singular(mass):
+        if _dependent(mass) is not None:
             raise GenerationError(f"{where}: lagrangian: its mass matrix is singular everywhere")
 
     def _check_constraints(self) -> None:
         """Refuses those that coordinates cannot meet, or that say again what others say."""
         slopes = jacobian([each.value for each in self.constraints], [c.symbol for c in self.coordinates])
+        dependent = _dependent(slopes) if slopes else None
         for k, (constraint, row) in enumerate(zip(self.constraints, slopes, strict=True)):
             said = f"{constraint.where}: constraint {constraint.name}"
             if constraint.value.is_number and constraint.value != 0:
                 raise GenerationError(
                     f"{said}: expected 0 somewhere, got {constraint.value}, which is never 0"
                 )
-            if _is_singular(_products([row])):
+            if not any(row):
                 raise GenerationError(f"{said}: expected one that some coordinate changes, got none")
-            if _is_singular(_products(slopes[: k + 1])):
+            if k == dependent:
                 others = ", ".join(each.name for each in self.constraints[:k])
                 raise GenerationError(
                     f"{said}: expected one that others do not contain, got what {others} fix already"
@@ -632,22 +634,25 @@ def _rate_symbol(q: Symbol) -> Symbol:
     return Symbol(rate_name(q.name), real=True)
 
 
-def _products(rows: list[list[Expr]]) -> list[list[Expr]]:
-    """Those of rows with one another: singular where the rows depend on one another."""
-    return [[Add(*(x * y for x, y in zip(one, other, strict=True))) for other in rows] for one in rows]
-
-
-def _is_singular(mass: list[list[Expr]]) -> bool:
-    """Whether a symmetric matrix is singular wherever one looks: at a few places, none of which is special."""
-    symbols = sorted({s for row in mass for entry in row for s in entry.free_symbols}, key=lambda s: s.name)
-    evaluate = lambdify(symbols, mass, "mpmath")
+def _dependent(rows: list[list[Expr]]) -> int | None:
+    """The first row that those before it contain wherever one looks: at a few places, none of which is special."""
+    least = 1e-8  # of a row, across those before it; a determinant would shrink with the number of rows
+    symbols = sorted({s for row in rows for entry in row for s in entry.free_symbols}, key=lambda s: s.name)
+    evaluate = lambdify(symbols, rows, "mpmath")
     draw = random.Random(1)
+    contained = {*range(len(rows))}
     for _ in range(3):
-        numbers = mpmath.matrix(evaluate(*(mpmath.mpf(draw.uniform(0.5, 2)) for _ in symbols)))
-        diagonal = mpmath.fprod(numbers[k, k] for k in range(len(mass)))
-        if abs(mpmath.det(numbers)) > 1e-12 * abs(diagonal):
-            return False
-    return True
+        across: list[list[complex]] = []
+        for k, row in enumerate(evaluate(*(mpmath.mpf(draw.uniform(0.5, 2)) for _ in symbols))):
+            left = whole = [complex(entry) for entry in row]
+            for other in across:
+                along = sum(x * y.conjugate() for x, y in zip(left, other, strict=True))
+                left = [x - along * y for x, y in zip(left, other, strict=True)]
+            size = math.hypot(*map(abs, left))
+            if size > least * math.hypot(*map(abs, whole)):
+                across.append([x / size for x in left])
+                contained.discard(k)
+    return min(contained, default=None)
 
 
 def read_model(file: Path, links: int | None = None) -> Model:

@@ -112,6 +112,17 @@ def test_it_is_refused_with_its_line(line, tmp_path):
     assert REFUSED[line] in str(refused.value)
 
 
+def test_many_coordinates_and_constraints_do_not_depend_on_one_another(tmp_path):
+    """Of 60 in a row a determinant is 1e-16 of the product of its diagonal, or less."""
+    model = read(
+        tmp_path,
+        "row = [model.coordinate(f'u_{k}', 'm') for k in range(60)]; "
+        "model.lagrangian += sum((model.rate(b) - model.rate(a))**2 for a, b in zip([0, *row], row)); "
+        "[model.constraint(f'tie_{k}', row[k + 1] - row[k], 'm') for k in range(59)]",
+    )
+    assert len(model.constraints) == 59
+
+
 def test_a_constant_has_no_rate_and_time_has_one():
     model = Model("said", 1, "said.py")
     x, m = model.coordinate("x", "m"), model.parameter("m", "kg")

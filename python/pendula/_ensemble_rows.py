@@ -47,7 +47,7 @@ def rows_of_members(
         return [f"{key}={float(numbers.values.flat[member])!r}" for key, numbers in own.items()]
 
     with plainly():
-        prepared = _core.prepare(alone, "pendula", overrides(0), *places(), tell, False)
+        prepared = _core.prepare(alone, "pendula", overrides(0), *places(), tell)
     columns = prepared.columns
     kept = _kept(columns, in_order(columns, prepared.state)[1:], keep)
     rows = np.full((made.members, times.size, len(kept)), np.nan)

@@ -97,7 +97,7 @@ class Beginning(NamedTuple):
         if self.model_file is not None and _hash(self.model_file) != self.model_hash:
             raise InputError(f"{self.model_file}: expected the model that was pickled, got another one")
         with plainly():
-            return _core.prepare(self.scenario, "pendula", [], *places(), tell, self.remember)
+            return _core.prepare(self.scenario, "pendula", [], *places(), tell)
 
 
 def _hash(file: object) -> str | None:
@@ -178,8 +178,9 @@ class Simulation:
         self._lock = threading.Lock()
         self._made = self._text.prepare()
         with plainly():
-            self._core = _core.Simulation(self._made)
+            self._core = _core.Simulation(self._made, self._text.remember)
             self._inputs = self._made.inputs
+        self._places = {column: k for k, column in enumerate(self._made.columns)}
         self._holds = {self._core.time: self._core.held}  # inputs by the time since which they are held
 
     @contextmanager
@@ -231,8 +232,10 @@ class Simulation:
         """A number of the row at the present time: ``simulation["x_2"]``, ``simulation["energy"]``."""
         if not isinstance(column, str):
             raise InputError(f"column: expected a name, got {column!r}")
+        if column not in self._places:
+            raise InputError(f"column: expected one of {', '.join(self._places)}, got {column}")
         with self._alone():
-            return self._core.number(column)
+            return float(self._core.row()[self._places[column]])
 
     def hold(self, inputs: Inputs | None = None, **more: float | str) -> Simulation:
         """Holds inputs from now on, until others are held; ``torque`` is that of all links. Raises InputError, and
@@ -381,7 +384,8 @@ class Simulation:
         """A simulation that goes on as this one does, to the last bit."""
         other = Simulation.__new__(Simulation)
         other._lock = threading.Lock()
-        other._text, other._made, other._inputs = self._text, self._made, self._inputs
+        other._text, other._made = self._text, self._made
+        other._inputs, other._places = self._inputs, self._places
         with self._alone():
             other._core = self._core.copy()
             other._holds = dict(self._holds)

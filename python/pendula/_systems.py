@@ -378,7 +378,7 @@ class Chain(System):
         tables = {key: one for key, one in self.tables().items() if key != "chain.feedback"}
         text = _toml.document({**tables, "start": self.at_zero(), "run": {"duration": 1.0}})
         with plainly():
-            return _core.prepare(text, "pendula", [], *places(), tell, False)
+            return _core.prepare(text, "pendula", [], *places(), tell)
 
     @property
     def links(self) -> int:

@@ -6,9 +6,9 @@
 
 #include <Eigen/Core>
 #include <array>
-#include <pendula/pendula.hpp>
 #include <pendula/run/derivatives.hpp>
 #include <pendula/run/inputs.hpp>
+#include <pendula/run/run_failed.hpp>
 #include <pendula/system/outcome.hpp>
 #include <stdexcept>
 #include <stop_token>
@@ -46,7 +46,7 @@ Directions<> directions_of(const Starts& from) {
 
 /// (times x 2 coordinates). Throws RunFailed.
 Array states_of(const Prepared& made, const MovedTo& moved) {
-  if (!moved.outcome) throw RunFailed(message(moved.outcome, made.subject->coordinates()));
+  require(moved.outcome, *made.subject);
   std::vector<double> states;
   for (const Motion& motion : moved.motions) {
     const std::vector<double> state = state_of(motion);
@@ -61,7 +61,7 @@ auto moved(const Prepared& made, const Motion& start, const Numbers& times, Do a
   decltype(act(std::declval<const MotionTask&>())) found;
   interruptibly([&](const std::stop_token& stop) {
     const MotionTask task{.subject = *made.subject,
-                          .options = made.run,
+                          .options = made.options,
                           .start = start,
                           .times = {times.data(), times.shape(0)},
                           .stop = [&] { return stop.stop_requested(); }};

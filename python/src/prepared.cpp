@@ -25,29 +25,12 @@
 namespace pendula::python {
 namespace {
 
-template <class Space>
-Model model_of(const io::Scenario<Space>& scenario) {
-  return Model(scenario.chain);
-}
-Model model_of(const io::SystemScenario& scenario) {
-  const PlainSystem numbers = scenario.system->numbers().plain();
-  std::size_t count = 0;
-  for (const auto size : scenario.system->info().parameter_sizes) count += static_cast<std::size_t>(size);
-  Model model(pendula_model_of_table(&scenario.system->table(), numbers.parameters, count, numbers.inputs,
-                                     scenario.system->info().inputs.size()));
-  for (const InputSine& sine : numbers.sines) {
-    const std::string input(scenario.system->info().inputs[static_cast<std::size_t>(sine.input)]);
-    model = model.driven(input, sine.amplitude, sine.frequency, sine.phase);
-  }
-  return model;
-}
-
 std::shared_ptr<Prepared> prepare(const std::string& text, const std::string& name,
                                   const std::vector<std::string>& overrides, const std::string& program,
-                                  const std::string& python, const Tell& tell, bool remembers) {
+                                  const std::string& python, const Tell& tell) {
   const nb::gil_scoped_release others_may_go_on;
   Models models(program, python, tell);
-  return prepared(io::parse_scenario(text, name, overrides, models.finder()), remembers);
+  return prepared(io::parse_scenario(text, name, overrides, models.finder()));
 }
 
 /// Throws io::InputError where a scenario is wrong.
@@ -68,11 +51,17 @@ std::optional<io::NaturalUnits> natural_units_of(const Prepared& made) {
   return std::visit([](const auto& scenario) { return scenario.natural; }, made.scenario);
 }
 
+/// Names of inputs, those with signals, too.
+std::vector<std::string> inputs_of(const Prepared& made) {
+  const std::shared_ptr<const Subject> part = made.subject->part_at(made.start.time);
+  return input_names(part ? *part : *made.subject);
+}
+
 /// Units in SI of coordinates, rates, inputs and parameters, by name.
 std::map<std::string, std::string> si_units_of(const Prepared& made) {
   std::map<std::string, std::string> units;
   for (const Constant& one : made.subject->constants()) units[one.name] = one.unit;
-  for (const std::string& input : input_names(*made.subject)) units[input] = "N m";
+  for (const std::string& input : inputs_of(made)) units[input] = "N m";
   const std::vector<std::string> columns = made.subject->columns();
   for (const Quantity& quantity : made.subject->quantities()) {
     for (std::size_t k = 0; k < quantity.size(); ++k) units[columns[quantity.column(k)]] = quantity.unit;
@@ -107,24 +96,16 @@ void require_continuous(const io::RunPlan& plan) {
 
 }  // namespace
 
-std::shared_ptr<Prepared> prepared(io::AnyScenario any, bool remembers) {
+std::shared_ptr<Prepared> prepared(io::AnyScenario any) {
   return std::visit(
       [&](const auto& scenario) {
-        const RunOptions& run = scenario.options;
         require_continuous(scenario);
-        const SimulationOptions options{.method = run.method,
-                                        .stages = scenario.places.contains("stages") ? run.stages : 0,
-                                        .form = run.form,
-                                        .solver = run.solver,
-                                        .iteration = run.iteration,
-                                        .step = run.step,
-                                        .tolerance = run.tolerance,
-                                        .remember = remembers};
         std::shared_ptr<const Subject> subject = io::subject_of(scenario);
         Motion start = scenario.start;
+        const RunOptions options = scenario.options;
         std::vector<std::string> warnings = scenario.warnings;
         return std::shared_ptr<Prepared>(
-            new Prepared{std::move(any), std::move(subject), std::move(start), options, run, std::move(warnings)});
+            new Prepared{std::move(any), std::move(subject), std::move(start), options, std::move(warnings)});
       },
       any);
 }
@@ -143,15 +124,11 @@ io::FindSystem Models::finder() {
   };
 }
 
-Model model_of(const Prepared& made) {
-  return std::visit([](const auto& scenario) { return model_of(scenario); }, made.scenario);
-}
-
 void define_prepared(nb::module_& module) {
   nb::class_<Prepared>(module, "Prepared")
       .def_prop_ro("columns", [](const Prepared& made) { return made.subject->columns(); })
       .def_prop_ro("state", [](const Prepared& made) { return state_columns(*made.subject); })
-      .def_prop_ro("inputs", [](const Prepared& made) { return model_of(made).input_names(); })
+      .def_prop_ro("inputs", &inputs_of)
       .def_prop_ro(
           "start", [](const Prepared& made) { return vector_of(state_of(made.start)); }, nb::rv_policy::move)
       .def_prop_ro("units", &units_of)
@@ -162,7 +139,7 @@ void define_prepared(nb::module_& module) {
       .def_ro("warnings", &Prepared::warnings);
   module.def("check", &check, nb::arg("text"), nb::arg("program"), nb::arg("python"), nb::arg("tell"));
   module.def("prepare", &prepare, nb::arg("text"), nb::arg("name"), nb::arg("overrides"), nb::arg("program"),
-             nb::arg("python"), nb::arg("tell"), nb::arg("remembers"));
+             nb::arg("python"), nb::arg("tell"));
 }
 
 }  // namespace pendula::python

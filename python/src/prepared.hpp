@@ -7,8 +7,9 @@
 #include <functional>
 #include <memory>
 #include <optional>
-#include <pendula/pendula.hpp>
 #include <pendula/run/subject.hpp>
+#include <pendula/system/motion.hpp>
+#include <pendula/system/options.hpp>
 #include <string>
 #include <vector>
 
@@ -42,15 +43,11 @@ struct Prepared {
   io::AnyScenario scenario;  // it owns the kernel
   std::shared_ptr<const Subject> subject;
   Motion start;
-  SimulationOptions options;
-  RunOptions run;
+  RunOptions options;
   std::vector<std::string> warnings;
 };
 
-/// What a scenario says; with `remembers` a simulation keeps its earlier steps.
-std::shared_ptr<Prepared> prepared(io::AnyScenario any, bool remembers);
-
-/// The same as a model of the front.
-Model model_of(const Prepared& made);
+/// What a scenario says.
+std::shared_ptr<Prepared> prepared(io::AnyScenario any);
 
 }  // namespace pendula::python

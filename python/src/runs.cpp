@@ -216,7 +216,7 @@ std::shared_ptr<Prepared> prepare_again(const Result& result, const std::string&
   const io::RunSource source = again_of(result);
   const nb::gil_scoped_release others_may_go_on;
   RunModel model(program, python, tell, result.saved.origin.model);
-  return prepared(io::parse_scenario(source.text.text, source.text.name, source.overrides, model.finder()), false);
+  return prepared(io::parse_scenario(source.text.text, source.text.name, source.overrides, model.finder()));
 }
 
 /// Knows the time of the last row.

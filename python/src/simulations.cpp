@@ -3,20 +3,17 @@
 #include <nanobind/stl/pair.h>
 #include <nanobind/stl/shared_ptr.h>
 #include <nanobind/stl/string.h>
+#include <nanobind/stl/unique_ptr.h>
 #include <nanobind/stl/vector.h>
 
-#include <pendula/pendula.h>
-
-#include <Eigen/Core>
 #include <functional>
-#include <limits>
 #include <memory>
 #include <pendula/ensemble/held_members.hpp>
-#include <pendula/pendula.hpp>
+#include <pendula/run/linearize.hpp>
 #include <pendula/run/lyapunov.hpp>
-#include <pendula/run/subject_kinds.hpp>
+#include <pendula/run/mover.hpp>
+#include <pendula/run/run_failed.hpp>
 #include <pendula/system/outcome.hpp>
-#include <stdexcept>
 #include <stop_token>
 #include <string>
 #include <utility>
@@ -30,87 +27,81 @@
 namespace pendula::python {
 namespace {
 
-/// A simulation, and what it needs; copies share that.
-struct SharedSimulation {
-  std::shared_ptr<const Prepared> made;
-  Simulation simulation;
-};
-
 /// Motions of one system side by side.
 struct Held {
   std::shared_ptr<const Prepared> made;
   HeldMembers members;
 };
 
-/// While it lives, an interruption stops the simulation.
+/// While it lives, an interruption stops the mover.
 class Heeding {
  public:
-  Heeding(Simulation& simulation, Interruption& interruption) : simulation_(simulation) {
-    const auto ask = [](void* context) { return (*static_cast<Interruption*>(context))() ? 1 : 0; };
-    heed(ask, &interruption);
-  }
+  Heeding(Mover& mover, Interruption& interruption) : mover_(mover) { mover_.set_stop(std::ref(interruption)); }
   Heeding(const Heeding&) = delete;
   Heeding& operator=(const Heeding&) = delete;
-  ~Heeding() { heed(nullptr, nullptr); }
+  ~Heeding() {
+    mover_.set_stop([] { return false; });
+  }
 
  private:
-  void heed(int (*ask)(void*), void* context) { pendula_heed(simulation_.get(), ask, context); }
-
-  Simulation& simulation_;
+  Mover& mover_;
 };
 
 }  // namespace
 
 void define_simulations(nb::module_& module) {
   nb::exception<RunFailed>(module, "StepFailed", PyExc_RuntimeError);  // NOLINT(bugprone-unused-raii)
-  nb::class_<SharedSimulation>(module, "Simulation")
-      .def("__init__",
-           [](SharedSimulation* self, const std::shared_ptr<const Prepared>& made) {
-             if (made->subject->part_at(0)) throw std::invalid_argument(signals_are_not_here);
-             new (self) SharedSimulation{made, Simulation(model_of(*made), made->start, made->options)};
-           })
-      .def("copy", [](const SharedSimulation& self) { return SharedSimulation(self); })
-      .def_prop_ro("time", [](const SharedSimulation& self) { return self.simulation.time(); })
-      .def_prop_ro("steps", [](const SharedSimulation& self) { return self.simulation.steps(); })
+  nb::class_<Mover>(module, "Simulation")
+      .def(nb::new_([](const Prepared& made, bool remembers) {
+        auto mover = std::make_unique<Mover>(made.subject, made.options, remembers);
+        require(mover->start(made.start), *made.subject);
+        return mover;
+      }))
+      .def("copy", [](const Mover& self) { return std::make_unique<Mover>(self); })
+      .def_prop_ro("time", [](const Mover& self) { return self.motion().time; })
+      .def_prop_ro("steps", &Mover::steps)
       .def_prop_ro(
-          "state", [](const SharedSimulation& self) { return vector_of(state_of(self.simulation.motion())); },
-          nb::rv_policy::move)
+          "state", [](const Mover& self) { return vector_of(state_of(self.motion())); }, nb::rv_policy::move)
       .def("advance_to",
-           [](SharedSimulation& self, double time) {
+           [](Mover& self, double time) {
              Interruption interruption;
              {
                const nb::gil_scoped_release others_may_go_on;
-               const Heeding heeding(self.simulation, interruption);
-               self.simulation.advance_to(time);
+               const Heeding heeding(self, interruption);
+               require(self.advance_to(time).outcome, self.subject());
              }
              if (interruption.is_requested()) throw nb::python_error();
            })
-      .def("at", [](SharedSimulation& self, double time) { return vector_of(state_of(self.simulation.at(time))); })
-      .def("number", [](const SharedSimulation& self, const std::string& column) { return self.simulation[column]; })
-      .def("hold",
-           [](SharedSimulation& self, const std::vector<double>& inputs) {
-             self.simulation.hold(
-                 Eigen::Map<const Eigen::VectorXd>(inputs.data(), static_cast<Eigen::Index>(inputs.size())));
+      .def("at",
+           [](Mover& self, double time) {
+             Motion motion;
+             require(self.at(time, motion), self.subject());
+             return vector_of(state_of(motion));
            })
-      .def_prop_ro("held",
-                   [](const SharedSimulation& self) {
-                     const Eigen::VectorXd held = self.simulation.held();
-                     return std::vector<double>(held.data(), held.data() + held.size());
-                   })
+      .def("row",
+           [](const Mover& self) {
+             std::vector<double> row;
+             self.subject().append_row(self.motion(), self.subject().observe(self.motion()), row);
+             return vector_of(std::move(row));
+           })
+      .def("hold", [](Mover& self, const std::vector<double>& inputs) { require(self.hold(inputs), self.subject()); })
+      .def_prop_ro("held", &Mover::inputs)
       .def("linearize",
-           [](const SharedSimulation& self) {
-             const auto [a, b] = self.simulation.linearize();
-             return std::pair(array_of(a), array_of(b));
+           [](const Mover& self) {
+             const auto n = static_cast<std::size_t>(2 * self.motion().q.size()), inputs = self.inputs().size();
+             std::vector<double> a(n * n), b(n * inputs);
+             linearize(self.subject(), self.motion(), a.data(), b.data());
+             return std::pair(owned<Array>(std::move(a), {n, n}), owned<Array>(std::move(b), {n, inputs}));
            })
-      .def("save", [](const SharedSimulation& self) { return vector_of(self.simulation.save().numbers); })
-      .def("resume", [](SharedSimulation& self, const Numbers& saved) {
-        self.simulation.resume({std::vector<double>(saved.data(), saved.data() + saved.size())});
+      .def("save", [](Mover& self) { return vector_of(self.save().numbers); })
+      .def("resume", [](Mover& self, const Numbers& saved) {
+        self.resume({std::vector<double>(saved.data(), saved.data() + saved.size())});
       });
   nb::class_<Held>(module, "HeldMembers")
       .def("__init__",
            [](Held* self, const std::shared_ptr<const Prepared>& made, double duration) {
-             new (self) Held{
-                 made, HeldMembers(made->subject, static_cast<std::size_t>(made->start.q.size()), made->run, duration)};
+             new (self) Held{made, HeldMembers(made->subject, static_cast<std::size_t>(made->start.q.size()),
+                                               made->options, duration)};
            })
       .def("move", [](Held& self, const Starts& inputs, const Starts& states) {
         std::vector<double> moved(states.data(), states.data() + states.size());
@@ -132,13 +123,12 @@ void define_simulations(nb::module_& module) {
                 int count) -> nb::typed<nb::tuple, Vector, Vector, double, double, double, double> {
                LyapunovRun found;
                interruptibly([&](const std::stop_token& stop) {
-                 const std::unique_ptr<Integrator> integrator = made.subject->make_integrator(made.run);
-                 const double step = is_adaptive(made.run) ? std::numeric_limits<double>::infinity() : made.run.step;
+                 const std::unique_ptr<Integrator> integrator = made.subject->make_integrator(made.options);
                  found = find_lyapunov_spectrum(
-                     *integrator, made.start, step, duration, count, [](const LyapunovProgress&) {},
-                     [&] { return stop.stop_requested(); });
+                     *integrator, made.start, longest_step(made.options), duration, count,
+                     [](const LyapunovProgress&) {}, [&] { return stop.stop_requested(); });
                });
-               if (!found.result.outcome) throw RunFailed(message(found.result.outcome, made.subject->coordinates()));
+               require(found.result.outcome, *made.subject);
                return nb::make_tuple(vector_of(found.exponents), vector_of(found.errors), found.sum, found.duration,
                                      found.ftle, found.megno);
              });

@@ -77,6 +77,8 @@ def test_a_simulation_takes_continuous_feedback_alone() -> None:
     run = cart().simulate(1.0, start=START, tolerance=1e-9, estimate=False)
     simulation.step(1.0)
     assert np.abs(simulation.state - run.y[:, -1]).max() < 1e-7  # measured 0
+    simulation.hold(push=1.0)
+    assert simulation["push"] == pytest.approx(1 + law(simulation.state), abs=1e-12)  # measured 0
     with pytest.raises(pendula.InputError, match="feedback: expected a continuous one, got one with sample"):
         pendula.Simulation(cart(sample=0.1), START)
     with pytest.raises(pendula.InputError, match="feedback: expected a continuous one, got one with sample"):

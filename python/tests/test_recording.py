@@ -45,7 +45,7 @@ def test_copies_and_pickles_have_what_was_held():
 
 
 def test_a_chain_is_recorded_and_what_was_not_held_is_none():
-    chain = pendula.Simulation(pendula.Chain(masses=[1, 1]), theta=0.5, step=0.01, stages=4)
+    chain = pendula.Simulation(pendula.Chain(masses=[1, 1]), theta=0.5, step=0.01)
     chain.step(1.0)
     run = chain.record()
     assert np.abs(run.y[:, -1] - chain.state).max() == 0

@@ -8,6 +8,7 @@
 #include <memory>
 #include <pendula/numeric/directions.hpp>
 #include <pendula/run/inputs.hpp>
+#include <pendula/run/run_failed.hpp>
 #include <pendula/run/subject.hpp>
 #include <pendula/system/motion.hpp>
 #include <pendula/system/options.hpp>
@@ -50,7 +51,7 @@ struct Journey {
   Eigen::Index state, varied, times;  // sizes: of a state; of parameters and inputs; number of rows
 };
 
-/// Moves by `act`, a function of a MotionTask. Throws RunFailure.
+/// Moves by `act`, a function of a MotionTask. Throws RunFailed.
 template <class Act>
 auto moved_along(const pendula_path& path, const Journey& journey, Act act) {
   MotionTask task{.subject = *journey.subject,

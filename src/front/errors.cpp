@@ -5,6 +5,7 @@
 #include <exception>
 #include <new>
 #include <pendula/run/no_kernel.hpp>
+#include <pendula/run/run_failed.hpp>
 
 #include "io/errors.hpp"
 
@@ -17,10 +18,6 @@ constinit thread_local pendula_status kind = PENDULA_OK;
 
 }  // namespace
 
-void require(const Outcome& outcome, const Subject& subject) {
-  if (!outcome) throw RunFailure(message(outcome, subject.coordinates(), subject.switches()));
-}
-
 pendula_status fail(pendula_status status, const char* what) noexcept {
   std::strncpy(text, what, longest - 1);
   return kind = status;
@@ -29,7 +26,7 @@ pendula_status fail(pendula_status status, const char* what) noexcept {
 pendula_status fail() noexcept {
   try {
     throw;
-  } catch (const RunFailure& error) {
+  } catch (const RunFailed& error) {
     return fail(PENDULA_FAILED, error.what());
   } catch (const NoKernel& error) {
     return fail(PENDULA_NO_KERNEL, error.what());

@@ -7,6 +7,7 @@
 #include <functional>
 #include <memory>
 #include <pendula/run/integrator.hpp>
+#include <pendula/run/run_failed.hpp>
 #include <pendula/system/options.hpp>
 #include <stdexcept>
 #include <string>

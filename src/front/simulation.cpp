@@ -4,6 +4,8 @@
 #include <cstddef>
 #include <memory>
 #include <pendula/run/linearize.hpp>
+#include <pendula/run/mover.hpp>
+#include <pendula/run/run_failed.hpp>
 #include <pendula/system/outcome.hpp>
 #include <span>
 #include <stdexcept>
@@ -13,7 +15,6 @@
 
 #include "front/errors.hpp"
 #include "front/model.hpp"
-#include "front/mover.hpp"
 #include "front/options.hpp"
 #include "io/trajectory.hpp"
 
@@ -22,7 +23,7 @@ struct pendula_simulation {
       : model(std::move(moved)), mover(model.subject, options, remembers) {}
 
   pendula_model model;
-  pendula::front::Mover mover;
+  pendula::Mover mover;
   std::vector<pendula_event> events;  // as given
   bool asked_to_stop = false;         // by a callback for rows
 };

@@ -59,6 +59,7 @@ struct SystemScenario : RunPlan {
   std::shared_ptr<const SystemSubject> system;
   Motion start;
   std::vector<std::pair<std::string, double>> assembled;  ///< coordinates and rates that constraints gave
+  std::vector<std::pair<std::string, double>> guesses;    ///< of these coordinates
   int constraints = 0;                                    ///< that do not follow from others at the start
 };
 

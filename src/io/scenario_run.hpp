@@ -108,6 +108,7 @@ void describe(const Scenario<Space>& scenario, const std::string& file, Summary&
 inline void describe(const SystemScenario& scenario, const std::string& file, Summary& summary) {
   summary.model = model_summary(file, *scenario.system);
   summary.model.assembled = scenario.assembled;
+  summary.model.guesses = scenario.guesses;
   summary.model.degrees_of_freedom -= scenario.constraints;
   describe_acting(scenario, summary.model);
   summary.system = snapshot(*scenario.system, summary.last);

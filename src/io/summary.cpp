@@ -72,7 +72,11 @@ std::string what_was_moved(const ModelSummary& model) {
       text += line("constraints", std::to_string(model.constraints),
                    plural(model.degrees_of_freedom, "degree") + " of freedom");
     }
-    for (const auto& [name, value] : model.assembled) text += line(name, rounded(value), "found for the start");
+    for (std::size_t k = 0; k < model.assembled.size(); ++k) {
+      const auto& [name, value] = model.assembled[k];
+      const std::string from = k < model.guesses.size() ? ", from " + rounded(model.guesses[k].second) : "";
+      text += line(name, rounded(value), "found for the start" + from);
+    }
     return text;
   }
   const UnitNames unit = unit_names(model.natural);

@@ -28,6 +28,7 @@ struct ModelSummary {
   std::string model;     ///< of a system that is no chain
   std::vector<std::pair<std::string, std::vector<double>>> parameters;  ///< of a system that is no chain
   std::vector<std::pair<std::string, double>> assembled;                ///< of its start, by constraints
+  std::vector<std::pair<std::string, double>> guesses;                  ///< of the first of these, the coordinates
   int constraints = 0, degrees_of_freedom = 0;                          ///< of a system that is no chain
   int links = 0;
   double mass = 0;    ///< Σ m_i

@@ -166,7 +166,7 @@ constexpr std::array<std::string_view, 2> chain_spaces = {Planar::name, Spatial:
 constexpr SummaryScope anything = SummaryScope::anything, chains = SummaryScope::chains,
                        systems = SummaryScope::systems;
 
-constexpr std::array<JsonRow, 46> rows = {{
+constexpr std::array<JsonRow, 47> rows = {{
     {{"pendula", "string", "version"}, [](const Summary&) { return Json(version); }},
     {{"scenario", "string", "file, as it was named"}, [](const Summary& s) { return Json(s.model.scenario); }},
     {{"space", "string", "planar or spatial", "", chains, chain_spaces},
@@ -184,6 +184,8 @@ constexpr std::array<JsonRow, 46> rows = {{
      [](const Summary& s) { return Json(s.model.degrees_of_freedom); }},
     {{"assembled", numbers_schema, "coordinates and rates of the start that constraints gave", "", systems},
      [](const Summary& s) { return named(s.model.assembled); }},
+    {{"guesses", numbers_schema, "of these coordinates, from which they were found", "", systems},
+     [](const Summary& s) { return named(s.model.guesses); }},
     {{"constraint_error", constraint_schema, "largest after a step, each in its unit; null without constraints", "",
       systems},
      [](const Summary& s) { return constraint_errors(s); }},

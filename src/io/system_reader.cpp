@@ -221,24 +221,26 @@ void require_inertia(const StartTable& table, const SystemSubject& system, const
   throw InputError(table.where(), "start", "coordinates where the mass matrix is not singular", got);
 }
 
-/// Puts a start on the constraints; returns what was found, by name.
-std::vector<std::pair<std::string, double>> put_together(const StartTable& table, const SystemSubject& system,
-                                                         Motion& start) {
-  std::vector<std::pair<std::string, double>> found;
+/// Puts the start on the constraints, and keeps by name what was found, and from where.
+void put_together(const StartTable& table, const SystemSubject& system, SystemScenario& scenario) {
   const SystemInfo& info = system.info();
-  if (info.constraints.empty()) return found;
+  if (info.constraints.empty()) return;
+  Motion& start = scenario.start;
+  const Eigen::VectorXd guess = start.q;
   const FreeNumbers free = table.free();
   if (const std::string left = assemble(system, free, start); !left.empty()) {
     throw InputError(table.where(), "start", "coordinates and rates that keep the constraints",
                      left + " left over; from other guesses of what is found (assemble) it may close");
   }
   for (std::size_t k = 0; k < info.coordinates.size(); ++k) {
-    if (free.coordinates[k]) found.emplace_back(info.coordinates[k], start.q[static_cast<Eigen::Index>(k)]);
+    if (!free.coordinates[k]) continue;
+    scenario.assembled.emplace_back(info.coordinates[k], start.q[static_cast<Eigen::Index>(k)]);
+    scenario.guesses.emplace_back(info.coordinates[k], guess[static_cast<Eigen::Index>(k)]);
   }
   for (std::size_t k = 0; k < info.coordinates.size(); ++k) {
-    if (free.rates[k]) found.emplace_back(rate_name(info.coordinates[k]), start.v[static_cast<Eigen::Index>(k)]);
+    if (!free.rates[k]) continue;
+    scenario.assembled.emplace_back(rate_name(info.coordinates[k]), start.v[static_cast<Eigen::Index>(k)]);
   }
-  return found;
 }
 
 void read_start(const Section& root, const SystemSubject& system, SystemScenario& scenario) {
@@ -249,7 +251,7 @@ void read_start(const Section& root, const SystemSubject& system, SystemScenario
     if (const auto rate = table.first_rate()) rate->fail("no rates beside the momenta " + momentum->name());
     start.v = system.rates(0, start.q, table.momenta());
   }
-  scenario.assembled = put_together(table, system, start);
+  put_together(table, system, scenario);
   const int all = static_cast<int>(system.info().constraints.size());
   scenario.constraints = independent_constraints(system, start);
   if (scenario.constraints < all) {

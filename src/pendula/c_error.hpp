@@ -4,18 +4,13 @@
 
 #include <cstddef>
 #include <pendula/run/no_kernel.hpp>
+#include <pendula/run/run_failed.hpp>
 #include <stdexcept>
 #include <string>
 #include <string_view>
 #include <vector>
 
 namespace pendula {
-
-/// The mathematics of a run failed: a step did not converge, or a start is singular. The message says how.
-class RunFailed : public std::runtime_error {
- public:
-  using std::runtime_error::runtime_error;
-};
 
 namespace detail {
 

@@ -2,6 +2,7 @@
 
 import json
 import math
+import random
 
 import pytest
 
@@ -292,6 +293,29 @@ def test_forces_know_inputs(by, scenario, rows):
         gives = 4 * (d**2 * (1 + 1 / 2) + y**2)  # of masses 2 (cart) and 1
         assert abs(force * gives / 2 + turning - 9.81 * y - d * pushed / 2) < 1e-9
         assert abs(d * d + y * y - 0.25) < 1e-13
+
+
+@pytest.mark.parametrize("seed", range(24))
+def test_wild_guesses_find_the_nearest_way_to_close(seed, scenario, simulate):
+    """Two circles about the joint of the first bar and the support meet twice."""
+    dice = random.Random(seed)
+    first = dice.uniform(-3, 3)
+    guess = [dice.uniform(-6, 6) for _ in range(2)]
+    joint, support = complex(math.sin(first), -math.cos(first)), 1.6
+    across, r, s = support - joint, 1.5, 1.2
+    along = (abs(across) ** 2 + r**2 - s**2) / (2 * abs(across))
+    ways = []
+    for side in (1j, -1j):
+        knee = joint + across / abs(across) * (along + side * math.sqrt(r**2 - along**2))
+        angles = [math.atan2(bar.real, -bar.imag) for bar in (knee - joint, support - knee)]
+        ways.append([a + math.tau * round((g - a) / math.tau) for a, g in zip(angles, guess, strict=True)])
+    start = (
+        f'theta_1 = {first}\ntheta_2 = {guess[0]}\ntheta_3 = {guess[1]}\nassemble = ["theta_2", "theta_3"]'
+    )
+    run = simulate(scenario(ANGLES, start), run__duration=0.01)
+    nearest = min(ways, key=lambda way: math.dist(way, guess))
+    assert math.dist(run["assembled"].values(), nearest) < 1e-13  # measured 9.9e-15
+    assert list(run["guesses"].values()) == guess
 
 
 STARTS = {

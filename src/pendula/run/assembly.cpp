@@ -3,9 +3,12 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <limits>
+#include <numbers>
 #include <pendula/numeric/number_text.hpp>
 #include <pendula/run/assembly.hpp>
 #include <pendula/system/system_model.hpp>
+#include <random>
 
 namespace pendula {
 namespace {
@@ -28,26 +31,63 @@ class Assembly {
   /// get worse.
   std::string place(const std::vector<bool>& free) {
     constexpr int most = 100;
+    went_straight_ = true;
     Eigen::VectorXd change = Eigen::VectorXd::Zero(start_.q.size());
     look(start_.q);
     double left = lacking();
     for (int correction = 0; correction < most && left > rounding; ++correction) {
       put(free, least(chosen(slopes_, free), -values_), change);
-      change /= std::max(1.0, largest_turn(change) / farthest);
+      const double shorter = std::max(1.0, largest_turn(change) / farthest);
+      change /= shorter;
       const Eigen::VectorXd before = start_.q;
       const double was = left;
       for (double part = 1; part > shortest; part /= 2) {
         look(before + part * change);
         left = lacking();
-        if (left < was) {
-          start_.q = before + part * change;
-          break;
-        }
+        if (!(left < was)) continue;
+        start_.q = before + part * change;
+        went_straight_ = went_straight_ && (part / shorter == 1 || left <= enough);
+        break;
       }
       if (!(left < was)) break;  // it stays where it was
     }
     look(start_.q);
     return lacking() <= enough ? "" : left_over("", values_);
+  }
+
+  /// The nearest of the ways to close that place() finds. It goes straight to a near one. Where its corrections had to
+  /// be shorter, another way may be nearer, or the only one: then it begins at other places, too, farther and farther
+  /// off the guess, up to half a turn or as far as what was found.
+  std::string place_nearest(const std::vector<bool>& free) {
+    constexpr int tries = 256;
+    const Eigen::VectorXd guess = start_.q;
+    std::string left = place(free);
+    if (left.empty() && went_straight_) return left;
+    const Eigen::VectorXd sizes = sizes_about(guess);
+    Eigen::VectorXd nearest = start_.q;
+    double distance = left.empty() ? (nearest - guess).norm() : std::numeric_limits<double>::infinity();
+    const auto comes_nearer = [&] {
+      if (!place(free).empty()) return false;
+      const double before = distance, found = (start_.q - guess).norm();
+      if (!(found < before)) return false;
+      nearest = start_.q;
+      distance = found;
+      return found < 0.99 * before;
+    };
+    std::mt19937 random(1);  // a scenario has one start
+    for (int k = 1; k <= tries; ++k) {
+      const double off = std::numbers::pi * k / tries;
+      if (off > std::max(distance, (nearest - guess).cwiseQuotient(sizes).norm())) break;
+      for (Eigen::Index i = 0; i < guess.size(); ++i) {
+        const double share = 2 * static_cast<double>(random()) / static_cast<double>(std::mt19937::max()) - 1;
+        start_.q[i] = guess[i] + (free[static_cast<std::size_t>(i)] ? off * share * sizes[i] : 0);
+      }
+      // Where more is free than constraints need, whole curves of places close: half way back leads to a nearer one.
+      while (comes_nearer()) start_.q = (guess + nearest) / 2;
+    }
+    start_.q = nearest;
+    look(start_.q);
+    return std::isfinite(distance) ? "" : left;
   }
 
   /// Minimises ½ vᵀ M v where (∂g/∂q) v + ∂g/∂t = 0.
@@ -109,6 +149,21 @@ class Assembly {
     Eigen::VectorXd rates(values_.size());
     here_(&SystemFunctions::constraint_rates, start_.q.data(), v.data(), rates.data(), second_.data());
     return rates;
+  }
+
+  /// 1 for angles; for other coordinates the largest of their unit, of a guess and of where it led.
+  Eigen::VectorXd sizes_about(const Eigen::VectorXd& guess) const {
+    const Eigen::VectorXd largest = guess.cwiseAbs().cwiseMax(start_.q.cwiseAbs());
+    Eigen::VectorXd sizes = Eigen::VectorXd::Ones(guess.size());
+    for (std::size_t i = 0; i < info_.coordinates.size(); ++i) {
+      double size = 0;
+      for (std::size_t k = 0; k < info_.coordinates.size() && !info_.is_angle[i]; ++k) {
+        if (info_.coordinate_units[k] != info_.coordinate_units[i]) continue;
+        size = std::max(size, largest[static_cast<Eigen::Index>(k)]);
+      }
+      if (size > 0) sizes[static_cast<Eigen::Index>(i)] = size;
+    }
+    return sizes;
   }
 
   double largest_turn(const Eigen::VectorXd& change) const {
@@ -173,6 +228,7 @@ class Assembly {
   Motion& start_;
   Eigen::VectorXd values_, second_;
   Matrix slopes_;
+  bool went_straight_ = true;  ///< whether no correction of place() was shorter than Newton's
 };
 
 }  // namespace
@@ -192,7 +248,7 @@ int independent_constraints(const SystemSubject& system, Motion state) {
 std::string assemble(const SystemSubject& system, const FreeNumbers& free, Motion& start) {
   if (system.info().constraints.empty()) return {};
   Assembly assembly(system, start);
-  std::string left = assembly.place(free.coordinates);
+  std::string left = assembly.place_nearest(free.coordinates);
   return left.empty() ? assembly.move(free.rates) : left;
 }
 

@@ -22,7 +22,7 @@
 #include <span>
 #include <vector>
 
-namespace pendula::front {
+namespace pendula {
 
 /// The states where steps began, and where the last one ended.
 class StepHistory {
@@ -65,8 +65,8 @@ struct Advance {
   std::optional<std::size_t> event = {};  // NOLINT(readability-redundant-member-init): left out in initializers
 };
 
-/// Moves a subject through time: the implementation of a pendula_simulation. A copy goes on as the original does, to
-/// the last bit, without its rows.
+/// Moves a subject through time as far as it is asked to: what simulations are made of. A copy goes on as the original
+/// does, to the last bit, without its rows.
 class Mover {
  public:
   /// Called when an event has happened; true stops the run there.
@@ -159,4 +159,4 @@ class Mover {
   std::vector<Viewer> viewers_;
 };
 
-}  // namespace pendula::front
+}  // namespace pendula

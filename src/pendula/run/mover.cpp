@@ -1,18 +1,17 @@
-#include "front/mover.hpp"
-
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <limits>
 #include <pendula/numeric/number_text.hpp>
 #include <pendula/run/inputs.hpp>
+#include <pendula/run/mover.hpp>
 #include <pendula/run/schedule.hpp>
 #include <pendula/system/stop_sign.hpp>
 #include <stdexcept>
 #include <string>
 #include <utility>
 
-namespace pendula::front {
+namespace pendula {
 namespace {
 
 /// Sets a flag for a scope.
@@ -257,4 +256,4 @@ void Mover::resume(const Member& saved) {
   if (remembers_) history_.add(motion_);
 }
 
-}  // namespace pendula::front
+}  // namespace pendula
