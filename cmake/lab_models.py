@@ -14,8 +14,8 @@ from pathlib import Path
 LINKS = {"cart_chain": 2, "driven_chain": 2, "joint_springs": 3}  # at first, of those that have links
 MOST_LINKS = 3  # programs grow by the square of it
 
-# Where they begin, and with what parameters that are not their defaults. Angles of links come last. The page puts linkages
-# together, from what is nearly closed.
+# Where they begin, and with what parameters that are not their defaults. Angles of links come last. The page puts
+# linkages together, from what is nearly closed.
 STARTS = {
     "cart_chain": {"q": [0, 2.0, 1.2, 0.8]},
     "driven_chain": {

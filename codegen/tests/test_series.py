@@ -5,6 +5,8 @@ from math import factorial
 
 import mpmath
 import pytest
+from sympy import Rational, Symbol, cos, diff, expand, sin, symbols
+
 from chains import chain, in_masses
 from pendula_codegen.chain_kernel import ChainKernel
 from pendula_codegen.entry_points import SystemKernel
@@ -13,7 +15,6 @@ from pendula_codegen.models import find_model, model_names
 from pendula_codegen.series import series_in
 from pendula_codegen.series_tape import SeriesTapes, series_tapes
 from series_truth import Decimals, Equations, Numbers, Rationals, by_tapes, equations, motion
-from sympy import Rational, Symbol, cos, diff, expand, sin, symbols
 from test_c_kernels import EVERYTHING, MANY
 from test_model_kernels import LINKED, read
 

@@ -3,7 +3,7 @@
 import math
 
 import pytest
-from conftest import await_frame, until
+from conftest import await_frame, program, until
 from playwright.sync_api import Page
 from test_page import COPIES, EXPONENT, coordinates, on_screen, set_slider, shown, swing_and_let_go
 
@@ -95,6 +95,12 @@ def test_what_cannot_be_put_together_is_said(open_lab):
     settle(page)
     assert page.is_hidden("#trouble")
     assert page.evaluate("pendulaLab.state.p.includes(1.1)")
+
+
+def test_a_page_of_ones_own_begins_closed(open_lab, tmp_path):
+    told = program("lab", "walking_leg", "-o", str(tmp_path / "leg.html"))
+    assert (told.returncode, told.stderr) == (0, "")
+    assert apart(open_lab(file=tmp_path / "leg.html"), "walking_leg") < 1e-13  # measured 1.7e-16
 
 
 def test_another_parameter_goes_on_from_where_it_is(open_lab):
