@@ -64,7 +64,7 @@ def test_a_linkage(folder, pendula):
     assert ended.returncode == 0, ended.stderr
     run = json.loads(ended.stdout)
     assert run["degrees_of_freedom"] == 1
-    assert max(run["constraint_error"].values()) < 1e-13  # measured
+    assert max(run["constraint_error"].values()) < 1e-13  # measured 3.2e-14
 
 
 def test_the_program_compiles_and_ends_where_the_scenario_does(folder, pendula, environment):
