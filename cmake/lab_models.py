@@ -14,18 +14,27 @@ from pathlib import Path
 LINKS = {"cart_chain": 2, "driven_chain": 2, "joint_springs": 3}  # at first, of those that have links
 MOST_LINKS = 3  # programs grow by the square of it
 
-# Where they begin, and with what parameters that are not their defaults. Angles of links come last.
+# Where they begin, and with what parameters that are not their defaults. Angles of links come last. The page puts
+# linkages together, from what is nearly closed.
 STARTS = {
     "cart_chain": {"q": [0, 2.0, 1.2, 0.8]},
     "driven_chain": {
         "q": [3.0, 3.1, 3.0],
         "p": {"y_amplitude": 0.05, "frequency": 120, "damping": 0.05, "lengths": 0.5},
     },
+    "four_bar": {"q": [1.57, 0.78, -2.92], "v": [9, -6, -6]},
     "furuta": {"q": [0, 2.6], "v": [3, 0]},
+    "hanging_chain": {"q": [1.31, 1.31, 1.4, 1.05, 1.05, 2.09, 2.88, 4.48], "p": {"damping": 0.002}},
     "joint_springs": {"q": [1.2, 0.6, 0.2]},
+    "peaucellier": {"q": [0.3, -0.95, 0.79, -0.61, 0.39, -0.56, 0.7, -1]},
     "rods": {"q": [2.0]},
+    "slider_crank": {"q": [0.7, -0.216, 1.109], "v": [8, -2.09, -1.95]},
     "spring_pendulum": {"q": [0.7, 0, -1.1], "v": [0, 0.9, 0]},
     "swinging_atwood": {"q": [1, 1.5707963267948966]},
+    "walking_leg": {
+        "q": [0.15, 0, -0.24, 0.313, -0.27, -0.455, -0.748, 0.081, -0.592, -0.281, -0.432, -0.918],
+        "v": [0, 1.9, -1.18, 0.42, 1.56, 0.46, -0.48, -1.11, 1.08, -0.44, 2.86, 0.01],
+    },
 }
 
 

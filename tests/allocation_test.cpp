@@ -127,8 +127,10 @@ TEST(Allocation, NoneInAStepTakenInParts) {
 TEST(Allocation, NoneInAStepWithConstraints) {
   // The third bar, and where it hangs, follow from the other two.
   const double a = 1.1, b = 1.9, c = std::acos(-(std::cos(a) + 1.5 * std::cos(b)) / 1.2);
-  const std::array parameters = {9.81, std::sin(a) + 1.5 * std::sin(b) + 1.2 * std::sin(c)};
-  const SystemModel model(system_table<kernels::FourBar>, {parameters.data(), nullptr, {}});
+  const double ground = std::sin(a) + 1.5 * std::sin(b) + 1.2 * std::sin(c);
+  const std::array parameters = {9.81, ground, 0.0, 1.0, 1.0, 1.5, 2.0, 1.2, 0.3};
+  const std::array torque = {0.0};
+  const SystemModel model(system_table<kernels::FourBar>, {parameters.data(), torque.data(), {}});
   const Motion start(0, Eigen::Vector3d(a, b, c), Eigen::Vector3d::Zero());
   for (int stages = 1; stages <= 8; ++stages) {
     GaussStepper<LagrangianSolver<>> stepper(model, stages, {}, Iteration::fixed_point);

@@ -1,11 +1,14 @@
 #include <gtest/gtest.h>
 
+#include <pendula/pendula.h>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdio>
 #include <fstream>
 #include <numbers>
 #include <pendula/kernels/cart_chain_1.hpp>
+#include <pendula/kernels/four_bar.hpp>
 #include <pendula/kernels/planar_2.hpp>
 #include <pendula/own_model.hpp>
 #include <pendula/pendula.hpp>
@@ -473,6 +476,35 @@ TEST(Propagate, StopsWhereThatIsRequested) {
   const Ends ends = propagate(equal_chain<Planar>(2), Eigen::MatrixXd::Constant(3, 2, 1.0),
                               {.duration = 1e6, .stop = source.get_token()});
   EXPECT_EQ(ends.how[2], PENDULA_STOPPED);
+}
+
+TEST(CInterface, PutsLinkagesTogether) {
+  const auto linkage = [](double ground) {
+    const std::array parameters = {9.81, ground, 0.0, 0.4, 0.4, 1.1, 1.1, 0.8, 0.8};
+    return pendula_model_of_table(&system_table<kernels::FourBar>, parameters.data(), parameters.size(), nullptr, 0);
+  };
+  pendula_model* const model = linkage(1.0);
+  ASSERT_NE(model, nullptr) << pendula_error();
+  const std::array guess = {1.57, 0.8, -2.9}, rates = {9.0, -6.0, -6.0};
+  for (const bool keeps : {true, false}) {
+    const std::array kept = {1, 0, 0};
+    std::array q = guess, v = rates;
+    ASSERT_EQ(pendula_assemble(model, 0, keeps ? kept.data() : nullptr, q.data(), v.data()), PENDULA_OK);
+    EXPECT_EQ(q[0] == guess[0], keeps);
+    const auto sum = [](auto part) { return 0.4 * part(0) + 1.1 * part(1) + 0.8 * part(2); };
+    EXPECT_NEAR(sum([&](std::size_t k) { return std::sin(q[k]); }), 1, 1e-15);         // measured 0
+    EXPECT_NEAR(sum([&](std::size_t k) { return std::cos(q[k]); }), 0, 1e-15);         // measured 1.2e-16
+    EXPECT_NEAR(sum([&](std::size_t k) { return std::cos(q[k]) * v[k]; }), 0, 1e-14);  // measured 8.9e-16
+    EXPECT_NEAR(sum([&](std::size_t k) { return std::sin(q[k]) * v[k]; }), 0, 1e-14);  // measured 8.9e-16
+    EXPECT_LT(std::abs(v[0] - rates[0]), 0.5);                                         // measured 0.012
+  }
+  pendula_model_free(model);
+  pendula_model* const wide = linkage(5.0);
+  std::array q = guess, v = rates;
+  EXPECT_EQ(pendula_assemble(wide, 0, nullptr, q.data(), v.data()), PENDULA_INVALID);
+  EXPECT_NE(std::string(pendula_error()).find("m in the loop_x"), std::string::npos) << pendula_error();
+  EXPECT_EQ(q, guess);
+  pendula_model_free(wide);
 }
 
 // For as long as chaos leaves the digits of two compilations alike. tests/lyapunov_test.cpp has published exponents.

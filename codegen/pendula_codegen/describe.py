@@ -27,7 +27,7 @@ def describe(file: Path, links: int | None = None) -> dict[str, object]:
         "about": _about(text),
         "file": str(file.resolve()),
         "links": model.links,
-        "has_links": _has_links(model),
+        "has_links": _has_links(model, text),
         "coordinates": [
             {
                 "name": c.symbol.name,
@@ -79,8 +79,9 @@ def describe_all() -> list[dict[str, object]]:
     return [describe(FOLDER / f"{name}.py") for name in model_names()]
 
 
-def _has_links(model: Model) -> bool:
-    return any(p.per_link for p in model.parameters)
+def _has_links(model: Model, text: str) -> bool:
+    read = (part.id for part in ast.walk(ast.parse(text)) if isinstance(part, ast.Name))
+    return any(p.per_link for p in model.parameters) or "links" in read
 
 
 def _about(text: str) -> str:

@@ -89,8 +89,9 @@ WRONG = [
     (["kernel", "--space", "planar"], "the following arguments are required: --links"),
     (
         ["program", "--model", "cubic"],
-        "unknown model 'cubic': expected a file ending in .py, or one of cart_chain, driven_chain, furuta, "
-        "joint_springs, rods, spring_pendulum, swinging_atwood",
+        "unknown model 'cubic': expected a file ending in .py, or one of cart_chain, driven_chain, four_bar, "
+        "furuta, hanging_chain, joint_springs, peaucellier, rods, slider_crank, spring_pendulum, swinging_atwood, "
+        "walking_leg",
     ),
     (["tableaux", "--depth", "3"], "unrecognized arguments: --depth 3"),
 ]

@@ -71,6 +71,20 @@ CASES = (
         "Driven and damped",
         "Friction in every joint, a push in rhythm: energy comes and goes.",
     ),
+    Case(
+        "four_bar",
+        "Four-bar linkage",
+        "Three bars in a loop: the crank turns over, the rocker to and fro.",
+    ),
+    Case("walking_leg", "Walking leg", "Jansen's linkage: a crank turns, and a foot walks."),
+    Case("peaucellier", "Straight line", "Peaucellier's linkage swings, and its tracer stays on a line."),
+    Case(
+        "slider_crank",
+        "Slider crank",
+        "A motor turns the crank faster and faster, friction holds the slider.",
+        10,
+    ),
+    Case("hanging_chain", "Hanging chain", "Eight rods between two hooks, let go from one side."),
     Case("cart_chain", "Cart", "Two links on a cart that a force pushes to and fro."),
 )
 

@@ -8,7 +8,6 @@
 #include <memory>
 #include <optional>
 #include <pendula/numeric/number_text.hpp>
-#include <pendula/run/assembly.hpp>
 #include <pendula/run/chain_subject.hpp>
 #include <pendula/run/library.hpp>
 #include <pendula/run/system_subject.hpp>
@@ -22,6 +21,7 @@
 
 #include "cli/commands.hpp"
 #include "cli/motion_check.hpp"
+#include "cli/usual_start.hpp"
 #include "io/errors.hpp"
 #include "io/generator.hpp"
 #include "io/kernel_cache.hpp"
@@ -57,19 +57,6 @@ State<Space> test_start(int links) {
     const Eigen::VectorXd phi_dot = (1.5 + 0.1 * number.array().sin()).matrix();
     return State<Space>::from_angles(theta, phi, theta_dot, phi_dot);
   }
-}
-
-/// A start for an unknown system: different angles and lengths, slow rates. Later attempts are nearer to zero.
-Motion any_start(const SystemInfo& info, int number) {
-  const auto count = static_cast<Eigen::Index>(info.coordinates.size());
-  Motion start(0, Eigen::VectorXd(count), Eigen::VectorXd(count));
-  const double size = std::ldexp(number % 2 == 0 ? 1.0 : -1.0, -number / 2);
-  for (Eigen::Index k = 0; k < count; ++k) {
-    const auto at = static_cast<double>(k);
-    start.q[k] = size * ((info.is_angle[static_cast<std::size_t>(k)] ? 0.7 : 1.2) + 0.3 * std::sin(at));
-    start.v[k] = 0.2 * size * std::cos(2 * at);
-  }
-  return start;
 }
 
 void print(const CheckLine& line) {
@@ -145,32 +132,6 @@ void check_system(const ModelToCheck& checked, const io::Toolchain& toolchain, T
   add(MotionCheck(info.name, *checked.system, checked.start, units, comparison.energy_rounding()), info.name, tally);
 }
 
-/// Numbers of a system with default parameters; 1 for parameters without a default.
-SystemNumbers usual_numbers(const SystemInfo& info) {
-  SystemNumbers numbers;
-  for (std::size_t k = 0; k < info.parameters.size(); ++k) {
-    const double usual = info.parameter_defaults[k];
-    numbers.parameters.insert(numbers.parameters.end(), static_cast<std::size_t>(info.parameter_sizes[k]),
-                              std::isfinite(usual) ? usual : 1.0);
-  }
-  numbers.inputs.assign(info.inputs.size(), 0.0);
-  return numbers;
-}
-
-/// The first start with a finite energy that keeps the constraints.
-Motion usual_start(const SystemSubject& system) {
-  constexpr int most = 40;
-  const std::vector<bool> none(system.info().coordinates.size(), false);
-  for (int number = 0; number < most; ++number) {
-    Motion start = any_start(system.info(), number);
-    system.close(start);
-    if (std::isfinite(system.observe(start).energy) && assemble(system, {none, none}, start).empty()) return start;
-  }
-  const std::string what = system.info().constraints.empty() ? " has an energy" : " has an energy and can be assembled";
-  throw io::InputError("check: expected a scenario with a start: at none of " + std::to_string(most) +
-                       " that were tried the model " + std::string(system.info().name) + what);
-}
-
 void check_model(const CheckOptions& options, Tally& tally) {
   const auto tell = [](const std::string& what) { std::cerr << "pendula: " << what << '\n'; };
   const io::Toolchain toolchain = io::Toolchain::of_this_program();
@@ -189,7 +150,7 @@ void check_model(const CheckOptions& options, Tally& tally) {
     } else {
       const auto kernel = io::find_kernel(checked.name, toolchain, tell).table;
       checked.system = std::make_shared<const SystemSubject>(kernel, usual_numbers(kernel->info));
-      checked.start = usual_start(*checked.system);
+      checked.start = usual_start(*checked.system, "check");
     }
     check_system(checked, toolchain, tally);
   } catch (const io::ModelError& error) {

@@ -130,9 +130,13 @@ ExitStatus models(bool json) {
   }
   std::vector<TableRow> rows{{"model", "coordinates", ""}};
   for (const Json& model : models) {
+    constexpr std::size_t most = 3;
+    const Json& all = model["coordinates"];
     std::string coordinates;
-    for (const Json& each : model["coordinates"]) coordinates += (coordinates.empty() ? "" : ", ") + text(each, "name");
-    if (model["has_links"]) coordinates += ", ...";
+    for (std::size_t k = 0; k < std::min(all.size(), most); ++k) {
+      coordinates += (coordinates.empty() ? "" : ", ") + text(all[k], "name");
+    }
+    if (model["has_links"] || all.size() > most) coordinates += ", ...";
     rows.push_back({text(model, "model"), coordinates, text(model, "about")});
   }
   print(rows);

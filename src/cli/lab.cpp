@@ -1,5 +1,6 @@
 #include <filesystem>
 #include <iostream>
+#include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <pendula/numeric/number_text.hpp>
@@ -8,6 +9,7 @@
 
 #include "cli/commands.hpp"
 #include "cli/output_files.hpp"
+#include "cli/usual_start.hpp"
 #include "io/errors.hpp"
 #include "io/files.hpp"
 #include "io/kernel_cache.hpp"
@@ -64,6 +66,16 @@ json start_of(const io::SystemScenario& scenario, const io::ModelName& name, con
   return start;
 }
 
+/// A linkage that is put together, as a link.
+std::string closed_state(const std::shared_ptr<const SystemTable>& kernel) {
+  const SystemSubject system(kernel, usual_numbers(kernel->info));
+  const Motion start = usual_start(system, "lab");
+  view::LabLink link = view::lab_link(system);
+  link.put("q", start.q);
+  link.put("v", start.v);
+  return link.text();
+}
+
 json scenario_start(const LabOptions& options, const io::Toolchain& toolchain) {
   std::optional<io::ModelName> model;
   const io::FindSystem find = [&](const io::ModelName& name) {
@@ -96,7 +108,9 @@ ExitStatus lab(const LabOptions& options) {
   const bool is_scenario = options.scenario == "-" || options.scenario.ends_with(".toml");
   if (!is_scenario && !options.scenario.empty()) {
     const io::ModelName name{options.scenario, options.links};
-    start = model_start(name, io::find_kernel(name, toolchain, no_words).table->info, toolchain);
+    const auto kernel = io::find_kernel(name, toolchain, no_words).table;
+    start = model_start(name, kernel->info, toolchain);
+    if (!kernel->info.constraints.empty()) start["state"] = closed_state(kernel);
   } else if (is_scenario) {
     start = scenario_start(options, toolchain);
   }

@@ -45,7 +45,8 @@ MotionCheck::MotionCheck(std::string_view kernel, const Subject& subject, Motion
       units_(std::move(units)),
       energy_rounding_(energy_rounding) {
   const double longest = std::ldexp(1.0, 40);
-  double time = std::ldexp(1.0, -40);
+  // In steps far shorter than the motion, constraints see nothing but rounding, and may refuse some.
+  double time = std::ldexp(1.0, has_constraints(subject_) ? -20 : -40);
   while (time < longest && !follows(time)) time *= 2;
   for (; time < longest && follows(time); time *= 2) time_ = time;
   constexpr int most_spans = 8;

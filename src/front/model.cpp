@@ -3,8 +3,10 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <functional>
 #include <pendula/chain/chain_numbers.hpp>
 #include <pendula/numeric/number_text.hpp>
+#include <pendula/run/assembly.hpp>
 #include <pendula/run/chain_subject.hpp>
 #include <pendula/run/inputs.hpp>
 #include <pendula/run/library.hpp>
@@ -269,6 +271,20 @@ pendula_status pendula_energies(const pendula_model* model, double time, const d
     const Observation seen = model->subject->observe(motion_of(*model, time, q, v));
     energies[0] = seen.kinetic;
     energies[1] = seen.potential();
+    return PENDULA_OK;
+  });
+}
+
+pendula_status pendula_assemble(const pendula_model* model, double time, const int* kept, double* q, double* v) {
+  return guarded([&] {
+    Motion motion = motion_of(*model, time, q, v);
+    const auto* system = dynamic_cast<const SystemSubject*>(model->subject.get());
+    if (system == nullptr) return PENDULA_OK;
+    std::vector<bool> free(model->coordinates, true);
+    if (kept != nullptr) std::transform(kept, kept + free.size(), free.begin(), std::logical_not<>());
+    const std::string left = bring_back(*system, free, motion);
+    if (!left.empty()) throw std::invalid_argument("expected a motion that keeps the constraints, got " + left);
+    write(motion, q, v);
     return PENDULA_OK;
   });
 }

@@ -112,6 +112,11 @@ pendula_status pendula_row(const pendula_model* model, double time, const double
 pendula_status pendula_energies(const pendula_model* model, double time, const double* q, const double* v,
                                 double* energies);
 
+/* Brings a motion onto the constraints of its model: by the least change of the coordinates whose `kept` is 0, (NULL:
+ * of all), then by the change of rates that has the least kinetic energy. Where that cannot be, q and v stay as they
+ * are, and pendula_error() says what is left over. */
+pendula_status pendula_assemble(const pendula_model* model, double time, const int* kept, double* q, double* v);
+
 /* --- One simulation --- */
 
 /* Names as in scenarios; NULL: "gauss", "momentum", "auto", "auto". All zero: adaptive steps. */

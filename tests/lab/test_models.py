@@ -351,9 +351,14 @@ def test_built_in_models_say_what_they_are(open_lab):
     assert {name: (kinds, connections) for name, kinds, connections in told} == {
         "cart_chain": ("cart,bob,bob", ""),
         "driven_chain": ("pivot,bob,bob", ""),
+        "four_bar": ("pivot,bob,bob", "rod,rod"),
         "furuta": ("pivot,bob", ""),
+        "hanging_chain": ("pivot" + 7 * ",bob", "rod,rod"),
         "joint_springs": ("bob,bob,bob", ""),
+        "peaucellier": ("pivot" + 4 * ",bob", ",".join(7 * ["rod"])),
         "rods": ("bob", ""),
+        "slider_crank": ("bob,cart", "rod"),
         "spring_pendulum": ("bob", "spring"),
         "swinging_atwood": ("floor,weight,bob", "pulleys,thread"),
+        "walking_leg": ("pivot" + 6 * ",bob", ",".join(11 * ["rod"])),
     }

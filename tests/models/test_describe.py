@@ -28,7 +28,7 @@ def test_models_lists_all_of_them(pendula, tmp_path):
     assert head == "model            coordinates"
     assert [row.split()[0] for row in rows] == BUILT_IN
     assert (
-        "furuta           alpha, theta     A Furuta pendulum: a rod that swings at the end of an arm, which"
+        "furuta           alpha, theta                    A Furuta pendulum: a rod that swings at the end of"
         in ended.stdout
     )
     models = json.loads(pendula("models", "--json", cwd=tmp_path).stdout)
@@ -55,11 +55,7 @@ def test_describe_tells_what_a_scenario_may_set(pendula, tmp_path):
 
 def test_examples_set_nothing_else(pendula):
     """Each parameter, input and coordinate of an example is one that `models` tells."""
-    built_in = {model["model"]: model for model in json.loads(pendula("models", "--json").stdout)}
-    own = {file.name: file for file in EXAMPLES.glob("*.py") if "def define(" in file.read_text()}
-    models = built_in | {
-        name: json.loads(pendula("describe", file, "--json").stdout) for name, file in own.items()
-    }
+    models = {model["model"]: model for model in json.loads(pendula("models", "--json").stdout)}
     scenarios = [tomllib.loads(file.read_text()) for file in EXAMPLES.glob("*.toml")]
     scenarios = [scenario for scenario in scenarios if "system" in scenario]
     assert {scenario["system"]["model"] for scenario in scenarios} == set(models)
@@ -114,7 +110,7 @@ def test_what_is_wrong_is_told(pendula, tmp_path, arguments, expected):
 
 
 def test_a_linkage(pendula):
-    lines = pendula("describe", EXAMPLES / "four_bar.py").stdout.splitlines()
+    lines = pendula("describe", "four_bar").stdout.splitlines()
     for line in [
         "constraint  unit",
         "loop_x      m",

@@ -37,6 +37,8 @@ def test_examples_run_without_a_warning(file, pendula):
     ("model", "links"),
     [
         *[(name, None) for name in ("furuta", "spring_pendulum", "swinging_atwood")],
+        *[(name, None) for name in ("four_bar", "slider_crank", "peaucellier", "walking_leg")],
+        *[("hanging_chain", None), ("hanging_chain", 4)],
         *[("joint_springs", 3), ("rods", 2), ("cart_chain", 2), ("driven_chain", 2), ("driven_chain", 1)],
     ],
 )

@@ -123,9 +123,8 @@ class Assembly {
     return "";
   }
 
-  int independent() {
+  int independent(double least) {
     look(start_.q);
-    constexpr double least = 1e-10;
     Matrix scaled = slopes_;
     for (Eigen::Index i = 0; i < scaled.rows(); ++i) {
       const double size = scaled.row(i).norm();
@@ -234,15 +233,20 @@ class Assembly {
 }  // namespace
 
 void SystemSubject::close(Motion& state) const {
-  if (info().constraints.empty()) return;
-  const std::vector<bool> all(info().coordinates.size(), true);
-  Assembly assembly(*this, state);
-  assembly.place(all);
-  assembly.change_rates(all, Eigen::VectorXd::Zero(state.v.size()));
+  bring_back(*this, std::vector<bool>(info().coordinates.size(), true), state);
 }
 
-int independent_constraints(const SystemSubject& system, Motion state) {
-  return system.info().constraints.empty() ? 0 : Assembly(system, state).independent();
+std::string bring_back(const SystemSubject& system, const std::vector<bool>& free, Motion& motion) {
+  if (system.info().constraints.empty()) return {};
+  Assembly assembly(system, motion);
+  std::string left = assembly.place(free);
+  if (!left.empty()) return left;
+  const Eigen::VectorXd none = Eigen::VectorXd::Zero(motion.v.size());
+  return assembly.change_rates(std::vector<bool>(free.size(), true), none);
+}
+
+int independent_constraints(const SystemSubject& system, Motion state, double least) {
+  return system.info().constraints.empty() ? 0 : Assembly(system, state).independent(least);
 }
 
 std::string assemble(const SystemSubject& system, const FreeNumbers& free, Motion& start) {

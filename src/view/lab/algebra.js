@@ -49,3 +49,13 @@ function leastChange(slopes, off) {
   }
   return slopes.map((slope) => slope.reduce((sum, s, a) => sum + s * y[a], 0));
 }
+
+/// What one motion is beside another.
+function differenceOf(there, here) {
+  const [q, v] = ["q", "v"].map((part) => there[part].map((x, k) => x - here[part][k]));
+  return { q, v };
+}
+
+function sizeOf({ q, v }) {
+  return Math.sqrt([...q, ...v].reduce((sum, x) => sum + x * x, 0));
+}

@@ -124,7 +124,7 @@ class Controls {
     add("chain");
     if (beginning.model && moved === beginning) add("");
     for (const name of Object.keys(models)) add(name);
-    menu.addEventListener("change", () => this.lab.go(menu.value));
+    menu.addEventListener("change", () => this.lab.looks.go(menu.value));
     this.menu = menu;
     this.host.append(element("div", { className: "menu" }, menu));
   }
@@ -174,7 +174,7 @@ class Controls {
     const { lab } = this;
     this.#title("settings.model");
     if (linkChoices.length > 1) {
-      this.#slider({ key: "links", unit: "", low: 1, high: Math.max(...linkChoices), step: 1, get: () => model.links, set: (n) => linkChoices.includes(n) && n !== model.links && lab.go(named, n) });
+      this.#slider({ key: "links", unit: "", low: 1, high: Math.max(...linkChoices), step: 1, get: () => model.links, set: (n) => linkChoices.includes(n) && n !== model.links && lab.looks.go(named, n) });
     }
     modelParameters.forEach((each, k) => {
       const now = this.#state.p[k] || each.default || 0;
@@ -235,7 +235,7 @@ class Controls {
       const numbers = Array.from(this.#state[part]);
       if (k < 0) for (let i = 0; i < n; ++i) numbers[i] = x;
       else numbers[k] = x;
-      lab.startFrom({ [part]: numbers });
+      lab.startFrom({ [part]: numbers }, k);
     };
     const angle = (label, k, level = "") => this.#slider({
       label: () => label, unit: "°", low: -180, high: 180, step: 1, level,

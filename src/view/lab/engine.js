@@ -95,7 +95,8 @@ class Engine {
 
   /// Begins a motion. `spec`: {space, masses, lengths, gravity, damping} of a chain, or {program, parameters}; both with
   /// `inputs`, constant parts (torques of a chain), and `sines` on them: [input, amplitude, frequency, phase] each. `start`:
-  /// {time, q, v}. `step`: constant steps of 4 stages, in place of the tolerance. Throws if that makes no sense.
+  /// {time, q, v}; that of a linkage is put together, from a start {given, from} in which one coordinate was set. `step`:
+  /// constant steps of 4 stages, in place of the tolerance. Throws if that makes no sense.
   begin(spec, start, step = 0) {
     this.free();
     const { module } = this;
@@ -110,7 +111,8 @@ class Engine {
     this.energies = this.#take(2);
     this.row = this.#take(this.columns);
     this.held = this.#take(this.inputs);
-    this.#write(start);
+    this.kept = this.#take(this.size);
+    this.#write(this.#closedStart(start));
     this.simulation = this.#simulation(start.time);
     this.time = start.time;
     this.isHeld = false;
@@ -161,7 +163,11 @@ class Engine {
     return 3 + 2 * this.size + 2 * this.pointCount;
   }
   get pointCount() {
-    return this.spec.program ? this.columns - 2 - 2 * this.size - this.inputs : 0;
+    return this.spec.program ? this.spec.components.reduce((sum, count) => sum + count, 0) : 0;
+  }
+  /// Whether there are constraints: the columns that are left are their forces.
+  get isLinkage() {
+    return Boolean(this.spec.program) && this.columns > 2 + 2 * this.size + this.inputs + this.pointCount;
   }
 
   /// The row of the present motion.
@@ -194,42 +200,35 @@ class Engine {
     const v = new Float64Array(this.size);
     this.#write({ q, v });
     this.#require(this.module.pendula_row(this.model, time, this.q, this.v, this.row) === 0);
-    return this.#read(this.row + 8 * (this.columns - 1 - this.pointCount), this.pointCount);
+    return this.#read(this.row + 8 * (1 + 2 * this.size + this.inputs), this.pointCount);
   }
 
-  /// Coordinates near to q at which the components of a point, from `first` on, are nearest to a place, by damped least
-  /// squares.
-  pose(q, first, place, time) {
-    const wanted = Array.from(place);
-    let now = Float64Array.from(q);
-    const reach = Math.hypot(...wanted) + 1;
-    for (let round = 0; round < 12; ++round) {
-      const here = this.pointsAt(now, time);
-      const off = wanted.map((x, k) => x - here[first + k]);
-      if (Math.hypot(...off) < 1e-9 * reach) break;
-      const step = leastChange(this.#slopes(now, first, off.length, time), off);
-      now = now.map((x, k) => x + step[k]);
+  /// The motion on the constraints that is nearest; coordinates whose numbers are in `kept` stay. Throws OpenLinkage.
+  closed(motion, kept = []) {
+    if (!this.isLinkage) return motion;
+    const { module, size } = this;
+    this.#write(motion);
+    new Int32Array(module.memory.buffer, this.kept, size).set(Array.from({ length: size }, (_, k) => Number(kept.includes(k))));
+    if (module.pendula_assemble(this.model, motion.time, this.kept, this.q, this.v) !== 0) throw new OpenLinkage(this.#text(module.pendula_error()));
+    return { time: motion.time, q: this.#read(this.q, size), v: this.#read(this.v, size) };
+  }
+
+  /// A start on the constraints. The coordinate `given` of a linkage goes from where it is in `from` as far towards what it is
+  /// in q as it can, in short parts, lest the linkage comes out put together in another way.
+  #closedStart({ time, q, v, given, from }) {
+    if (!from || !this.isLinkage) return this.closed({ time, q, v });
+    let now = this.closed({ time, q: from, v });
+    for (let part = 0.02; part > 1e-4 && now.q[given] !== q[given]; ) {
+      const next = now.q.slice();
+      const left = q[given] - next[given];
+      next[given] = Math.abs(left) > part ? next[given] + Math.sign(left) * part : q[given];
+      try {
+        now = this.closed({ ...now, q: next }, [given]);
+      } catch {
+        part /= 4;
+      }
     }
     return now;
-  }
-
-  /// Rates at which the velocity of the point is nearest to a given one.
-  ratesFor(q, first, velocity, time) {
-    const driven = this.pointRates({ time, q, v: new Float64Array(q.length) });
-    const off = Array.from(velocity, (x, k) => x - driven[first + k]);
-    return Float64Array.from(leastChange(this.#slopes(q, first, off.length, time), off));
-  }
-
-  // Derivatives of the components of a point by each coordinate, by differences.
-  #slopes(q, first, count, time) {
-    const here = this.pointsAt(q, time);
-    return Array.from(q, (x, k) => {
-      const moved = q.slice();
-      const by = 1e-6 * (1 + Math.abs(x));
-      moved[k] += by;
-      const there = this.pointsAt(moved, time);
-      return Array.from({ length: count }, (_, axis) => (there[first + axis] - here[first + axis]) / by);
-    });
   }
 
   /// Advances to the next row. `hand`: a pull at a chain, {bob, place, speed}, or null.
@@ -325,12 +324,14 @@ class Engine {
     return this.module.pendula_steps(this.simulation);
   }
 
-  /// Makes copies, each a little further from the motion in every coordinate, since a motion may not depend on some.
+  /// Makes copies, each a little further from the one before in every coordinate, since a motion may not depend on some;
+  /// of a linkage as far as that goes.
   copy(count, apart) {
     for (const copy of this.copies) this.module.pendula_simulation_free(copy);
-    const { q, v } = this.motion();
-    this.copies = Array.from({ length: count }, (_, k) => {
-      this.#write({ q: q.map((x) => x + apart * (k + 1)), v });
+    let last = this.motion();
+    this.copies = Array.from({ length: count }, () => {
+      last = this.closed({ ...last, q: last.q.map((x) => x + apart) });
+      this.#write(last);
       return this.#simulation(this.time);
     });
   }
@@ -354,10 +355,11 @@ class Engine {
     this.shadow = null;
     this.exponent = null;
     if (!on) return;
-    const { q, v } = this.motion();
-    this.#write({ q: q.map((x) => x + shadowDistance / Math.sqrt(this.size)), v });
+    const here = this.motion();
+    const way = { q: here.q.map(() => 1), v: here.v.map(() => 0) };
+    const distance = this.#besides(here, way);
     this.shadow = this.#simulation(this.time);
-    this.exponent = { since: this.time, last: this.time, sum: 0, value: NaN };
+    this.exponent = { since: this.time, last: this.time, sum: 0, value: NaN, distance };
   }
 
   #follow() {
@@ -365,16 +367,24 @@ class Engine {
     this.#advance(this.shadow, this.time);
     if (this.time - exponent.last < 0.5 - 1e-9) return;
     const here = this.motion();
-    const there = this.motion(this.shadow);
-    const [dq, dv] = ["q", "v"].map((part) => there[part].map((x, k) => x - here[part][k]));
-    const distance = Math.sqrt(dq.reduce((s, d) => s + d * d, 0) + dv.reduce((s, d) => s + d * d, 0));
-    exponent.sum += Math.log(distance / shadowDistance);
+    const way = differenceOf(this.motion(this.shadow), here);
+    exponent.sum += Math.log(sizeOf(way) / exponent.distance);
     exponent.last = this.time;
     exponent.value = exponent.sum / (this.time - exponent.since);
-    const factor = shadowDistance / distance;
-    this.#write({ q: here.q.map((x, k) => x + factor * dq[k]), v: here.v.map((x, k) => x + factor * dv[k]) });
+    exponent.distance = this.#besides(here, way);
     this.#require(this.module.pendula_restart(this.shadow, this.time, this.q, this.v) === 0);
   }
+
+  // Writes a motion that is about shadowDistance away from another one, and gives the distance.
+  #besides(here, way) {
+    const factor = shadowDistance / sizeOf(way);
+    const there = this.closed({ ...here, q: here.q.map((x, k) => x + factor * way.q[k]), v: here.v.map((x, k) => x + factor * way.v[k]) });
+    this.#write(there);
+    return this.isLinkage ? sizeOf(differenceOf(there, here)) : shadowDistance;
+  }
 }
+
+/// A linkage that cannot be put together, and what is left over.
+class OpenLinkage extends Error {}
 
 const shadowDistance = 1e-7;

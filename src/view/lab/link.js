@@ -11,7 +11,7 @@ class Computer {
     this.worker.onmessage = ({ data }) => {
       const { take, refuse } = this.#waiting.get(data.number);
       this.#waiting.delete(data.number);
-      if (data.error !== undefined) refuse(new Error(data.error));
+      if (data.error !== undefined) refuse(Object.assign(new Error(data.error), { isOpen: data.isOpen }));
       else take(data);
     };
     this.worker.onerror = (event) => {

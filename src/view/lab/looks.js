@@ -71,6 +71,14 @@ class Looks {
     setTimeout(() => (at("link").textContent = text("link")), 1600);
   }
 
+  /// Another system, with this number of links: reloads the page, with the same looks.
+  go(name, links = 0) {
+    const { level, lang, theme } = this.lab.state;
+    const looks = Object.entries({ level, lang, theme }).filter(([, value]) => value).map(([key, value]) => `&${key}=${value}`);
+    clearTimeout(this.writing);
+    location.hash = `model=${name || ""}${links ? `&n=${links}` : ""}${looks.join("")}`;
+  }
+
   // The user has typed another link.
   follow() {
     if (location.hash.slice(1) === linkOf(this.lab.state)) return;

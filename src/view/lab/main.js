@@ -46,10 +46,7 @@ class Lab {
     return this.state.q.length;
   }
   get coordinates() {
-    if (model) return model.coordinates.map((each) => each.name);
-    const { n, space } = this.state;
-    const names = Array.from({ length: n }, (_, k) => `theta_${k + 1}`);
-    return space === 2 ? names : names.concat(names.map((name) => name.replace("theta", "phi")));
+    return coordinatesOf(this.state);
   }
   get units() {
     return model ? model.coordinates.map((each) => each.unit) : this.state.q.map(() => "rad");
@@ -81,12 +78,13 @@ class Lab {
   /// Sends the system to the worker, with the present row as its start.
   async send() {
     const { state } = this;
-    const start = { time: this.shown, q: Float64Array.from(this.row.subarray(1, 1 + this.size)), v: Float64Array.from(this.row.subarray(1 + this.size, 1 + 2 * this.size)) };
+    const start = { time: this.shown, q: Float64Array.from(this.row.subarray(1, 1 + this.size)), v: Float64Array.from(this.row.subarray(1 + this.size, 1 + 2 * this.size)), ...this.given };
+    this.given = {};
     const order = (this.order = (this.order ?? 0) + 1);
     this.isSending = true;
     try {
       const answer = await this.computer.ask("begin", { spec: specOf(state), start, copies: state.copies, apart: state.apart, measure: this.isMeasuring });
-      if (order !== this.order) return;
+      if (order !== this.order || this.isWaiting) return; // another one follows
       this.#trouble("");
       if (this.history.rowSize !== answer.rowSize || this.history.rows === 0) this.history.clear(answer.rowSize);
       else this.history.cut(start.time - 1e-9);
@@ -94,8 +92,13 @@ class Lab {
       this.since = start.time;
       const [kinetic, potential] = answer.rows.subarray(1 + 2 * this.size, 3 + 2 * this.size);
       this.energy = kinetic + potential;
-      this.energyScale = this.#scaleOf(kinetic, potential);
+      this.energyScale = energyScaleOf(state, kinetic, potential);
       this.row = answer.rows.slice();
+      if (model && start.time === state.t) {
+        this.startsAt(this.row); // a linkage was put together
+        this.controls.refresh();
+      }
+      this.good = { p: state.p.slice(), q: state.q.slice(), v: state.v.slice() };
       this.clock = this.shown = start.time;
       this.copies = null;
       for (const panel of this.panels) if (panel instanceof CopiesPanel || panel instanceof ExponentPanel || panel instanceof InputsPanel) panel.begin();
@@ -106,19 +109,25 @@ class Lab {
         this.row = answer.rows.slice();
       }
     } catch (error) {
-      if (order === this.order) this.#fail(error);
+      if (order !== this.order || this.isWaiting) return;
+      if (error.isOpen && this.good) this.#goBack(error);
+      else this.#fail(error);
     } finally {
       if (order === this.order) this.isSending = false;
       this.isDue = true;
     }
   }
 
-  // The scale of energies: Σ M g l of a chain, as in the program's summaries; otherwise the energies themselves.
-  #scaleOf(kinetic, potential) {
-    const { m, l, g, n } = this.state;
-    let [below, sum] = [0, 0];
-    for (let k = n - 1; k >= 0 && !model; --k) sum += (below += m[k]) * Math.abs(g) * l[k];
-    return sum || [Math.abs(kinetic), Math.abs(potential)].filter((each) => each > 1e-12).sort((a, b) => b - a)[0] || 1;
+  // A linkage that cannot be put together so goes on as it was.
+  async #goBack(error) {
+    const { good } = this;
+    this.good = null; // it is tried once
+    Object.assign(this.state, good);
+    if (this.history.rows === 0) this.#begin();
+    this.controls.refresh();
+    this.looks.writeLink();
+    await this.send();
+    if (this.good) this.#trouble(text("open", { what: error.message }));
   }
 
   /// Changes numbers of the system; the motion goes on from the shown state.
@@ -137,18 +146,11 @@ class Lab {
     for (const panel of this.panels) panel.begin?.();
   }
 
-  /// Sets another start, and begins there.
-  startFrom(numbers) {
+  /// Sets another start, and begins there. `given`: the one coordinate that was set; those of a linkage follow it.
+  startFrom(numbers, given) {
     Object.assign(this.state, numbers);
+    this.given = { given, from: this.good?.q };
     this.again();
-  }
-
-  /// Another system, with this number of links: reloads the page, with the same looks.
-  go(name, links = 0) {
-    const { level, lang, theme } = this.state;
-    const looks = Object.entries({ level, lang, theme }).filter(([, value]) => value).map(([key, value]) => `&${key}=${value}`);
-    clearTimeout(this.looks.writing);
-    location.hash = `model=${name || ""}${links ? `&n=${links}` : ""}${looks.join("")}`;
   }
 
   /// Begins again at the start of the link.
@@ -387,7 +389,6 @@ class Lab {
       this.watch.write();
     }
   }
-
 }
 
 const lab = new Lab();

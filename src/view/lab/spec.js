@@ -157,3 +157,17 @@ function specOf(state) {
   }
   return { space: state.space, masses: state.m, lengths: state.l, gravity: state.g, damping: state.m.map(() => state.d), ...acting };
 }
+
+/// Names of the coordinates.
+function coordinatesOf({ n, space }) {
+  if (model) return model.coordinates.map((each) => each.name);
+  const names = Array.from({ length: n }, (_, k) => `theta_${k + 1}`);
+  return space === 2 ? names : names.concat(names.map((name) => name.replace("theta", "phi")));
+}
+
+/// The scale of energies: Σ M g l of a chain, as in the program's summaries; otherwise the energies themselves.
+function energyScaleOf({ m, l, g, n }, kinetic, potential) {
+  let [below, sum] = [0, 0];
+  for (let k = n - 1; k >= 0 && !model; --k) sum += (below += m[k]) * Math.abs(g) * l[k];
+  return sum || [Math.abs(kinetic), Math.abs(potential)].filter((each) => each > 1e-12).sort((a, b) => b - a)[0] || 1;
+}

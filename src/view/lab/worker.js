@@ -17,7 +17,7 @@ const orders = {
     engine.begin(spec, start);
     if (copies) engine.copy(copies, apart);
     if (measure) engine.measure(true);
-    return { begun: true, rows: engine.present(), rowSize: engine.rowSize, shape: spec.program ? engine.shape(start.q, spec.components, spec.connections) : null };
+    return { begun: true, rows: engine.present(), rowSize: engine.rowSize, shape: spec.program ? engine.shape(engine.motion().q, spec.components, spec.connections) : null };
   },
 
   copy({ copies, apart }) {
@@ -32,8 +32,9 @@ const orders = {
 
   /// Finds a state with a point at a place, at a speed.
   pose({ q, time, first, place, speed }) {
-    const posed = engine.pose(q, first, place, time);
-    const v = speed.some((each) => each !== 0) ? engine.ratesFor(posed, first, speed, time) : new Float64Array(q.length);
+    const posed = pose(engine, q, first, place, time);
+    const rest = new Float64Array(q.length);
+    const v = speed.some((each) => each !== 0) ? ratesFor(engine, posed, first, speed, time) : engine.closed({ time, q: posed, v: rest }).v;
     return { q: posed, v, points: engine.pointsAt(posed, time), rates: engine.pointRates({ time, q: posed, v }) };
   },
 
@@ -64,7 +65,7 @@ self.onmessage = ({ data }) => {
       const answer = await orders[data.order](data);
       self.postMessage({ ...answer, number: data.number, order: data.order });
     } catch (error) {
-      self.postMessage({ error: error.message, number: data.number, order: data.order });
+      self.postMessage({ error: error.message, isOpen: error instanceof OpenLinkage, number: data.number, order: data.order });
     }
   });
 };
