@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <limits>
@@ -36,6 +37,7 @@ class FixedPointStop {
       : enough_(squared(limits.enough)),
         last_bit_(squared(limits.last_bit)),
         usual_(squared(limits.usual)),
+        expected_(usual_),
         small_(squared(limits.small)),
         certainly_(limits.certainly) {}
 
@@ -45,10 +47,14 @@ class FixedPointStop {
   /// A new step begins.
   void restart(const Num& scale) {
     count_ = 0;
+    expected_ = usual_;
     scale_ = scale;
     kept_ = Num(0.0);
     last_.fill(Num(0.0));
   }
+
+  /// From now on in this step, corrections of this size may be rounding, even if usual ones are smaller.
+  void expect(double rounding) { expected_ = std::max(expected_, squared(rounding)); }
 
   /// Takes the corrections just made, squared. Verdict: which iterations are done, and which will not converge.
   struct Verdict {
@@ -96,10 +102,10 @@ class FixedPointStop {
   void look_ahead(Verdict& verdict, const Num& bound, const Num& now, const Num& rate) {
     const Num both = rate * before_;
     const Mask is_last = (now * now * both <= bound * bound) & (both < Num(quick * quick));
-    const Mask is_small = now <= Num(small_) * scale_, is_rounding = now <= Num(last_bit_) * scale_;
+    const Mask is_small = now <= Num(std::max(small_, expected_)) * scale_, is_rounding = now <= Num(last_bit_) * scale_;
     kept_ = select((rate >= Num(0.81)) & (now <= Num(16.0) * best_), kept_ + Num(1.0), Num(0.0));
     Mask stays = is_small & (min(rate, before_) >= Num(quick));
-    stays = stays & ((now <= Num(usual_) * scale_) | (kept_ >= Num(double(certainly_))));
+    stays = stays & ((now <= Num(expected_) * scale_) | (kept_ >= Num(double(certainly_))));
     if (any(stays)) stays = stays & (sqrt(rate) >= Num(0.5) + Num(0.5) * average());
     const Mask stalls = stays | (is_rounding & (rate * rate >= before_));
     verdict.done = verdict.done | is_last | stalls | (now == Num(0.0));
@@ -124,7 +130,7 @@ class FixedPointStop {
   static constexpr double quick = 0.25;   // the square of a rate that is sure to go on
   static constexpr std::size_t known = 2 * Sequences;
 
-  double enough_, last_bit_, usual_, small_;
+  double enough_, last_bit_, usual_, expected_, small_;
   int certainly_;
   int count_ = 0;
   Num first_{0.0}, scale_{0.0}, begin_{0.0}, best_{0.0};

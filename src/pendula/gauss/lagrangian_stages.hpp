@@ -159,11 +159,13 @@ class LagrangianStages : public SystemMotion<StagesInLanes<Eigen::Dynamic, doubl
     const StageIteration on{columns_.m(), columns_.each_hb(), state_.data(), weights_.data(), U_.front().numbers()};
     if (constraints_) return iterate_constrained(on);
     const IterationChange found = at_stages()(&SystemFunctions::iterate, on);
-    return relative(found.change, std::max(found.size, floor()));
+    return found.change == 0 ? 0 : found.change / std::max(found.size, floor());
   }
+  /// What rounding may make of that change by way of constraints.
+  double rounding() const { return constraints_ ? constraints_->rounding() / size_ : 0; }
 
-  /// A change of increments, relative to their size. What rounding may make of them by way of constraints looks like
-  /// rounding: an iteration goes on as long as it shrinks.
+  /// A correction of Newton's, relative to the size of increments. What rounding may make of it by way of constraints
+  /// looks like rounding.
   double relative(double change, double size) const {
     if (change == 0) return 0;
     const double rounding = constraints_ ? constraints_->rounding() : 0;
@@ -450,7 +452,8 @@ class LagrangianStages : public SystemMotion<StagesInLanes<Eigen::Dynamic, doubl
     const IterationChange found =
         detail::replace_increments<Width>(on.hb, Base::call(0, 2), on.weights, 2 * count_, on.increments);
     constraints_->correct(on.start, on.increments);
-    return relative(found.change, std::max(found.size, floor()));
+    size_ = std::max(found.size, floor());
+    return found.change == 0 ? 0 : found.change / size_;
   }
 
   std::span<const double> end_pushes() const {
@@ -494,6 +497,7 @@ class LagrangianStages : public SystemMotion<StagesInLanes<Eigen::Dynamic, doubl
   std::vector<double> weights_;                                 // √M_kk; then that of changes of momenta, times h
   mutable std::optional<StageConstraints<Width>> constraints_;  // where it looks at a state, too
   double floor_ = 0, most_kinetic_ = 0;
+  double size_ = 1;  // of the step, in the last iteration with constraints
   StepPrediction prediction_;
 };
 

@@ -79,9 +79,11 @@ class StageIterations {
     if (!is_by_newton()) {
       const double change = stages_.iterate();
       if (count_ == 1) stages_.see_first(change);
-      if (!choice_.is_automatic() ||
-          !diverges(change, last_.relative, count_, usual_rounding(parts, epsilon), epsilon)) {
-        return {change};
+      double rounding = 0;
+      if constexpr (requires { stages_.rounding(); }) rounding = stages_.rounding();
+      const double usual = std::max(rounding, usual_rounding(parts, epsilon));
+      if (!choice_.is_automatic() || !diverges(change, last_.relative, count_, usual, epsilon)) {
+        return {.relative = change, .rounding = rounding};
       }
       if (!choice_.newton_is_allowed()) return {std::numeric_limits<double>::quiet_NaN()};
       stages_.start_cold();

@@ -105,6 +105,7 @@ class StepSolution {
   bool is_at_roundoff(const Correction& correction) {
     const double change = correction.relative;
     if (correction.convergence == Convergence::quadratic) return newton_stop_.reached(change);
+    fixed_point_stop_.expect(correction.rounding);
     return fixed_point_stop_.judge(change * change, true).done;
   }
 
