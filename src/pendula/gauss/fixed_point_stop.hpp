@@ -102,7 +102,8 @@ class FixedPointStop {
   void look_ahead(Verdict& verdict, const Num& bound, const Num& now, const Num& rate) {
     const Num both = rate * before_;
     const Mask is_last = (now * now * both <= bound * bound) & (both < Num(quick * quick));
-    const Mask is_small = now <= Num(std::max(small_, expected_)) * scale_, is_rounding = now <= Num(last_bit_) * scale_;
+    const Mask is_small = now <= Num(std::max(small_, expected_)) * scale_,
+               is_rounding = now <= Num(last_bit_) * scale_;
     kept_ = select((rate >= Num(0.81)) & (now <= Num(16.0) * best_), kept_ + Num(1.0), Num(0.0));
     Mask stays = is_small & (min(rate, before_) >= Num(quick));
     stays = stays & ((now <= Num(expected_) * scale_) | (kept_ >= Num(double(certainly_))));
