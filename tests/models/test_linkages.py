@@ -3,6 +3,7 @@
 import json
 import math
 import random
+import statistics
 
 import pytest
 
@@ -192,7 +193,29 @@ def test_order_is_twice_the_number_of_stages(name, scenario, simulate):
         order = math.log(errors[-2] / errors[-1]) / math.log(steps[-1] / steps[-2])
         assert abs(order - 2 * stages) < 0.5, (stages, errors)
         for run in runs:
-            assert max(run["constraint_error"].values()) < 1e-13, (stages, run["constraint_error"])
+            assert max(run["constraint_error"].values()) < 1e-13, (stages, run["constraint_error"])  # 1.4e-15
+
+
+# Steps a second of each number of stages: from there on errors shrink to rounding.
+MANY_STAGES = {5: (8, 12, 16, 20, 24), 6: (6, 8, 10, 12, 16), 7: (5, 6, 8, 10, 12), 8: (4, 5, 6, 8, 10)}
+
+
+@pytest.mark.parametrize("name", LINKAGES)
+def test_orders_of_many_stages(name, scenario, simulate):
+    """Errors change their signs, so that orders are those of a line through five of them."""
+    file = scenario(*LINKAGES[name])
+    pace = 2 if name == "slider" else 1
+    truth = last(simulate(file, run__stages=8, run__step=1 / 256, run__iteration="newton"))
+    for stages, steps in MANY_STAGES.items():
+        runs = [
+            simulate(file, run__stages=stages, run__step=1 / (pace * n), run__iteration="newton")
+            for n in steps
+        ]
+        errors = [math.log(off(run, truth)) for run in runs]
+        order = -statistics.linear_regression([math.log(n) for n in steps], errors).slope
+        assert order > 2 * stages - 1, (stages, order)  # measured from 2 s - 0.6 to 2 s + 6.4
+        for run in runs:
+            assert max(run["constraint_error"].values()) < 1e-13, (stages, run["constraint_error"])  # 1.4e-15
 
 
 def test_energy_does_not_drift(scenario, rows):
