@@ -251,8 +251,14 @@ def functions_of(model: Model) -> list[tuple[str, Program, list[Expr]]]:
         **{"E": said.residual, "E_D_q": said.residual_q, "E_D_v": said.residual_v, "E_D_a": said.mass},
         **{"r": said.positions, "r_dot": said.velocities},
         "found": [value for value, _ in kernel.call_arguments],
-        "g": [switch.value for switch in model.switches],
+        **{
+            "g_D_q": said.constraints_q,
+            "g_dot": said.constraint_rates,
+            "g_ddot": said.constraint_second_rates,
+        },
     }
+    # Two functions give a g.
+    of = {"switches": [switch.value for switch in model.switches], "constraints": said.constraints}
     right = {
         "v": [p - rest for p, rest in zip(kernel.momentum_symbols, said.momenta_at_rest, strict=True)],
         "a": [-value for value in said.residual_at_rest],
@@ -262,7 +268,7 @@ def functions_of(model: Model) -> list[tuple[str, Program, list[Expr]]]:
     for function in kernel.functions():
         expected = [] if function.solve is None else [*lower, *right[function.solve.kind]]
         for output in function.outputs:
-            expected += values[output.name]
+            expected += of[function.name] if output.name == "g" else values[output.name]
         found.append((function.name, kernel.program(function), expected))
     return found
 

@@ -253,7 +253,7 @@ def test_every_case_of_the_gallery_is_an_example():
     names = {file.stem for file in (ROOT / "examples").glob("*.toml")}
     assert {case.scenario for case in CASES} <= names and len({case.name for case in CASES}) == len(
         CASES
-    ) == 12
+    ) == 17
     listed = (ROOT / "docs/gallery.md").read_text()
     for case in CASES:
         assert (
