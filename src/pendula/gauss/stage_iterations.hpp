@@ -26,6 +26,11 @@ class StageIterations {
     count_ = 0;
   }
   Iteration iteration() const { return choice_.preferred(); }
+  /// What rounding may make of the last correction of a fixed point, relative, where that may be more than usual.
+  double rounding() const {
+    if constexpr (requires { stages_.rounding(); }) return stages_.rounding();
+    return 0;
+  }
 
   double defect(double noticed) {
     return first_correction_ >= noticed * stages_.predictor_gain() ? stages_.defect() : 0;
@@ -79,11 +84,9 @@ class StageIterations {
     if (!is_by_newton()) {
       const double change = stages_.iterate();
       if (count_ == 1) stages_.see_first(change);
-      double rounding = 0;
-      if constexpr (requires { stages_.rounding(); }) rounding = stages_.rounding();
-      const double usual = std::max(rounding, usual_rounding(parts, epsilon));
-      if (!choice_.is_automatic() || !diverges(change, last_.relative, count_, usual, epsilon)) {
-        return {.relative = change, .rounding = rounding};
+      if (!choice_.is_automatic() ||
+          !diverges(change, last_.relative, count_, std::max(rounding(), usual_rounding(parts, epsilon)), epsilon)) {
+        return {change};
       }
       if (!choice_.newton_is_allowed()) return {std::numeric_limits<double>::quiet_NaN()};
       stages_.start_cold();

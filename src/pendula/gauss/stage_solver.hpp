@@ -15,7 +15,6 @@ struct Correction {
   double relative = 0;  ///< largest change of an unknown, relative to the size of the unknowns
   int part = -1;        ///< 0-based link or coordinate where it happened; −1: ask the solver
   Convergence convergence = Convergence::linear;
-  double rounding = 0;  ///< relative size that rounding may have, where that is more than usual
 };
 
 /// What does not change while a solver is used. Parts are what messages name: the links of a chain, the coordinates of

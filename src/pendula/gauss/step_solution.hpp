@@ -105,7 +105,9 @@ class StepSolution {
   bool is_at_roundoff(const Correction& correction) {
     const double change = correction.relative;
     if (correction.convergence == Convergence::quadratic) return newton_stop_.reached(change);
-    fixed_point_stop_.expect(correction.rounding);
+    if constexpr (requires { solver_.rounding(); }) {
+      if (const double rounding = solver_.rounding(); rounding > 0) fixed_point_stop_.expect(rounding);
+    }
     return fixed_point_stop_.judge(change * change, true).done;
   }
 
