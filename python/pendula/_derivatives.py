@@ -62,7 +62,8 @@ def differentiate(
         Times of the rows, in s, from 0 on, at which steps end; if left out, the duration alone.
     start : mapping, optional
         As for :meth:`Chain.simulate`, as keyword arguments, too. Where parameters vary, coordinates and rates of the
-        start are held fixed, even if momenta are given.
+        start are held fixed, even if momenta are given. Of a model with constraints, derivatives by a start are those
+        by the nearest one that keeps the constraints.
     until : str, optional
         An expression of ``t``, coordinates, rates and points that does not jump. The last row is where it first crosses
         zero.

@@ -434,6 +434,8 @@ def lyapunov(
 ) -> Lyapunov:
     """The leading Lyapunov exponents, by the exact derivatives of the steps; ``count`` of them, 0: all.
 
+    A motion has two for each coordinate, and two fewer for each independent constraint.
+
     >>> import pendula
     >>> pendula.lyapunov(pendula.Chain(links=1), 20.0, theta=0.5, step=0.02).exponents.shape
     (2,)
