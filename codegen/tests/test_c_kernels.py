@@ -210,10 +210,13 @@ class Truth:
                     "g_ddot": said("constraint_second_rates", at),
                 }
             case "constraints_along" | "constraint_rates_along":
-                slope = self._slope(function.removesuffix("_along"), at, {"parameters": "d_parameters"})
+                moved = {"parameters": "d_parameters"}
+                if function == "constraint_rates_along":
+                    moved |= {"q": "dq", "v": "dv"}
+                slope = self._slope(function.removesuffix("_along"), at, moved)
                 if function == "constraints_along":
                     return {"dg": slope["g"], "d_g_D_q": slope["g_D_q"]}
-                return {"d_g_dot": slope["g_dot"]}
+                return {"d_g_dot": slope["g_dot"], "d_g_ddot": slope["g_ddot"]}
             case "switches":
                 return {"g": self._values("switches", [s.value for s in self.model.switches], at)}
             case "positions":
