@@ -5,13 +5,13 @@
 #include <cmath>
 #include <cstddef>
 #include <numeric>
-#include <pendula/numeric/pack_rows.hpp>
 #include <pendula/run/assembly.hpp>
 #include <pendula/run/derivatives.hpp>
 #include <pendula/run/linearize.hpp>
 #include <pendula/run/subject_kinds.hpp>
 #include <pendula/system/constraint_forces.hpp>
 #include <pendula/system/parameter_slopes.hpp>
+#include <pendula/system/state_slopes.hpp>
 #include <pendula/system/system_model.hpp>
 #include <stdexcept>
 #include <utility>
@@ -20,87 +20,38 @@
 namespace pendula {
 namespace {
 
-/// A system at one motion, and derivatives of its functions by coordinates and rates.
+/// A system at one motion, its masses, and derivatives of its functions.
 class Beside {
  public:
   Beside(const SystemModel& model, const Motion& motion)
-      : n_(motion.q.size()), one_(model), many_(model), motion_(motion), masses_(n_, n_) {
-    one_.set_time(motion.time);
-    many_.set_time(motion.time);
-    one_(&SystemFunctions::mass_matrix, motion.q.data(), masses_.data());
+      : n_(motion.q.size()), here_(model), slopes_(model), motion_(motion), masses_(n_, n_) {
+    here_.set_time(motion.time);
+    here_(&SystemFunctions::mass_matrix, motion.q.data(), masses_.data());
     factors_.compute(masses_);
   }
 
-  const SystemAt<1>& one() const { return one_; }
+  const SystemAt<1>& here() const { return here_; }
   const Directions<>& masses() const { return masses_; }
   Eigen::MatrixXd moved(const Eigen::MatrixXd& forces) const { return factors_.solve(forces); }
 
-  /// Of accelerations without constraints  (n x 2n).
-  Directions<> acceleration() {
-    const auto n = static_cast<std::size_t>(n_);
-    PackRows<width> states = repeated(motion_.v), found(2 * n);
-    return slopes(
-        n,
-        [&](double* dq, double* dv) {
-          many_(&SystemFunctions::acceleration_along, states[0], states[n], dq, dv, found[0], found[n]);
-        },
-        found, n);
-  }
-
-  /// Of dg/dt, and of d²g/dt² without accelerations, where rates are `v`  (constraints x 2n).
+  Directions<> acceleration() { return slopes_.acceleration(motion_.time, motion_.q.data(), motion_.v.data()); }
   std::pair<Directions<>, Directions<>> constraint_rates(const Eigen::VectorXd& v) {
-    const auto n = static_cast<std::size_t>(n_), m = many_.model().info().constraints.size();
-    const PackRows<width> still(many_.model().parameters().size() + 1);
-    PackRows<width> states = repeated(v), found(2 * m);
-    const auto run = [&](double* dq, double* dv) {
-      many_(&SystemFunctions::constraint_rates_along, still[0], dq, dv, states[0], states[n], found[0], found[m]);
-    };
-    return {slopes(m, run, found, 0), slopes(m, run, found, m)};
+    return slopes_.constraint_rates(motion_.time, motion_.q.data(), v.data());
   }
 
   /// Of the momenta, M v + …, by coordinates, where rates are `v`  (n x n).
   Directions<> momentum(const Eigen::VectorXd& v) const {
     Eigen::VectorXd p(n_), f(n_);
     Directions<> p_D_q(n_, n_), p_D_v(n_, n_), f_D_q(n_, n_), f_D_v(n_, n_);
-    one_(&SystemFunctions::momentum_form_with_jacobians, motion_.q.data(), v.data(), p.data(), f.data(), p_D_q.data(),
-         p_D_v.data(), f_D_q.data(), f_D_v.data());
+    here_(&SystemFunctions::momentum_form_with_jacobians, motion_.q.data(), v.data(), p.data(), f.data(), p_D_q.data(),
+          p_D_v.data(), f_D_q.data(), f_D_v.data());
     return p_D_q;
   }
 
  private:
-  static constexpr std::size_t width = 8;
-
-  PackRows<width> repeated(const Eigen::VectorXd& v) const {
-    PackRows<width> states(static_cast<std::size_t>(2 * n_));
-    for (Eigen::Index k = 0; k < n_; ++k) {
-      std::fill_n(states[k], width, motion_.q[k]);
-      std::fill_n(states[n_ + k], width, v[k]);
-    }
-    return states;
-  }
-
-  // Along each of (q, v): what run(dq, dv) writes to the rows of `found` from `begin` on.
-  template <class Run>
-  Directions<> slopes(std::size_t rows, Run run, const PackRows<width>& found, std::size_t begin) const {
-    Directions<> all(static_cast<Eigen::Index>(rows), 2 * n_);
-    PackRows<width> moved(static_cast<std::size_t>(2 * n_));
-    for (Eigen::Index first = 0; first < 2 * n_; first += static_cast<Eigen::Index>(width)) {
-      const auto count = static_cast<std::size_t>(std::min(static_cast<Eigen::Index>(width), 2 * n_ - first));
-      std::fill_n(moved[0], moved.rows() * width, 0.0);
-      for (std::size_t lane = 0; lane < count; ++lane) moved[static_cast<std::size_t>(first) + lane][lane] = 1;
-      run(moved[0], moved[n_]);
-      for (std::size_t k = 0; k < rows; ++k) {
-        for (std::size_t lane = 0; lane < count; ++lane) {
-          all(static_cast<Eigen::Index>(k), first + static_cast<Eigen::Index>(lane)) = found[begin + k][lane];
-        }
-      }
-    }
-    return all;
-  }
-
   Eigen::Index n_;
-  SystemAt<1> one_;
-  SystemAt<width> many_;
+  SystemAt<1> here_;
+  StateSlopes slopes_;
   const Motion& motion_;
   Directions<> masses_;
   Eigen::PartialPivLU<Eigen::MatrixXd> factors_;
@@ -148,7 +99,7 @@ class ConstraintsBeside {
         slope_(m_, n_),
         resisting_(n_, m_) {
     if (m_ == 0) return;
-    forces_.look(beside.one(), motion.q.data());
+    forces_.look(beside.here(), motion.q.data());
     for (Eigen::Index i = 0; i < m_; ++i) {
       for (Eigen::Index k = 0; k < n_; ++k) {
         slope_(i, k) = forces_.slope(static_cast<std::size_t>(i), static_cast<std::size_t>(k));
@@ -193,11 +144,11 @@ class ConstraintsBeside {
   ///   M (δa − δa_free) = −(δM) M⁻¹Gᵀλ + (δG)ᵀ λ + Gᵀ δλ,   G δa + (δG) a + δ(d²g/dt² without accelerations) = 0.
   void constrain(const Motion& motion, Directions<>& acceleration) {
     Eigen::VectorXd free(n_), lambda(m_);
-    beside_.one()(&SystemFunctions::acceleration, motion.q.data(), motion.v.data(), free.data());
-    forces_.find(beside_.one(), motion.q.data(), motion.v.data(), free.data(), lambda.data());
+    beside_.here()(&SystemFunctions::acceleration, motion.q.data(), motion.v.data(), free.data());
+    forces_.find(beside_.here(), motion.q.data(), motion.v.data(), free.data(), lambda.data());
     const Eigen::VectorXd none = Eigen::VectorXd::Zero(n_), pulled = beside_.moved(slope_.transpose() * lambda);
     Directions<> turned(n_, n_);
-    forces_.find_curvature(beside_.one(), motion.q.data(), lambda.data(), turned.data());
+    forces_.find_curvature(beside_.here(), motion.q.data(), lambda.data(), turned.data());
     acceleration.leftCols(n_) += beside_.moved(turned - (beside_.momentum(pulled) - beside_.momentum(none)));
     Directions<> lacking = slope_ * acceleration + beside_.constraint_rates(motion.v).second;
     lacking.leftCols(n_) +=

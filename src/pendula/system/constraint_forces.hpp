@@ -1,7 +1,5 @@
 #pragma once
 
-#include <algorithm>
-#include <cmath>
 #include <cstddef>
 #include <pendula/numeric/general_inverse.hpp>
 #include <pendula/numeric/linear_system.hpp>
@@ -106,25 +104,6 @@ class ConstraintForces {
     };
     take_second_derivatives(coordinates_, rate,
                             [&](std::size_t k, std::size_t l, double second) { found[k * coordinates_ + l] = second; });
-  }
-
-  /// The derivative of dg/dt by q, in the state q, v  (count x coordinates): of second rates, vᵀ g'' v + 2 v·∂g'/∂t +
-  /// …, it is a fourth of what they change by from v − e to v + e.
-  void find_rates_by_place(const SystemAt<1>& here, const double* q, const double* v, double* found) {
-    double speed = 0;
-    for (std::size_t k = 0; k < coordinates_; ++k) speed = std::max(speed, std::abs(v[k]));
-    if (speed == 0) speed = 1;
-    for (std::size_t k = 0; k < coordinates_; ++k) {
-      for (const double side : {1.0, -1.0}) {
-        std::copy_n(v, coordinates_, moving_.begin());
-        moving_[k] += side * speed;
-        here(&SystemFunctions::constraint_rates, q, moving_.data(), rates_.data(), second_.data());
-        for (std::size_t i = 0; i < count_; ++i) {
-          double& entry = found[i * coordinates_ + k];
-          entry = (side > 0 ? 0 : entry) + side * second_[i] / (4 * speed);
-        }
-      }
-    }
   }
 
  private:
