@@ -249,6 +249,33 @@ def test_damping_faster_than_a_step(damping, scenario, simulate, pendulum):
     assert abs(math.atan2(found["x"], -found["y"]) - pendulum(0.8, math.pi / 2, damping)) < 1e-9
 
 
+WALL = """
+from sympy import Piecewise, cos, sin
+def define(model, links):
+    x, y = PLACE
+    model.lagrangian = SPEED_SQUARED / 2 - 9.81 * y - Piecewise((200 * (x - 0.3)**2, x > 0.3), (0, True))
+"""
+BY_ROD = """    model.constraint("rod", (x**2 + y**2 - 1) / 2, "m^2")
+"""
+
+
+@pytest.mark.parametrize("settings", [{"run__accuracy": 1e-10, "run__step": ""}, {"run__stages": 8}])
+def test_pieces_meet_between_steps(settings, scenario, simulate):
+    """A bob on a rod runs into a soft wall, as the pendulum by its angle does."""
+    by_rod = WALL.replace("PLACE", 'model.coordinate("x", "m"), model.coordinate("y", "m")')
+    by_rod = by_rod.replace("SPEED_SQUARED", "(model.rate(x)**2 + model.rate(y)**2)") + BY_ROD
+    rod = simulate(scenario(by_rod, "x = -0.8\ny = -0.6"), run__duration=10, **settings)
+    by_angle = WALL.replace(
+        "x, y = PLACE", 'theta = model.coordinate("theta", "rad")\n    x, y = sin(theta), -cos(theta)'
+    )
+    by_angle = by_angle.replace("SPEED_SQUARED", "model.rate(theta)**2")
+    angle = simulate(scenario(by_angle, "theta = -0.9272952180016122"), run__duration=10, **settings)
+    assert max(rod["constraint_error"].values()) < 1e-14
+    place, theta = rod["final"]["q"], angle["final"]["q"]["theta"]
+    # Measured off by 2.4e-12 by accuracy, 7.8e-16 by steps.
+    assert max(abs(place["x"] - math.sin(theta)), abs(place["y"] + math.cos(theta))) < 1e-9
+
+
 @pytest.mark.parametrize("iteration", ["fixed-point", "newton"])
 def test_a_constraint_that_follows_from_others(iteration, scenario, pendula, pendulum):
     """A parallelogram with a third crank is a pendulum; the three forces are not unique, and that is said."""

@@ -124,4 +124,17 @@ class ConstraintForces {
   std::size_t independent_ = 0;
 };
 
+/// Accelerations of a system in a state; constraints hold.
+inline void find_accelerations(const SystemModel& model, double time, const double* q, const double* v, double* found) {
+  SystemAt<1> here(model);
+  here.set_time(time);
+  here(&SystemFunctions::acceleration, q, v, found);
+  if (model.info().constraints.empty()) return;
+  ConstraintForces forces(model.info());
+  std::vector<double> lambda(forces.count());
+  forces.look(here, q);
+  forces.find(here, q, v, found, lambda.data());
+  forces.move(lambda.data(), found);
+}
+
 }  // namespace pendula
