@@ -319,7 +319,8 @@ def require_free(constraints: Sequence[Constraint]) -> None:
     if constraints:
         names = ", ".join(each.name for each in constraints)
         raise GenerationError(
-            f"export: expected a model without constraints, got one with {names}: what is exported cannot keep them yet"
+            f"export: expected a model without constraints, got one with {names}: C and CasADi cannot keep them yet; "
+            "an FMU can (--as fmu)"
         )
 
 

@@ -104,8 +104,9 @@ const char* pendula_parameter_name(const pendula_model* model, size_t parameter)
 const char* pendula_parameter_unit(const pendula_model* model, size_t parameter);
 /* Writes the values of the parameters, (pendula_parameters()). */
 void pendula_parameter_values(const pendula_model* model, double* values);
-/* Writes the numbers of one row, (pendula_columns()). */
-pendula_status pendula_row(const pendula_model* model, double time, const double* q, const double* v, double* row);
+/* Writes the numbers of one row, (pendula_columns()). Inputs are held; NULL: those of the model. */
+pendula_status pendula_row(const pendula_model* model, double time, const double* q, const double* v,
+                           const double* inputs, double* row);
 
 /* Writes the kinetic and the potential energy of a motion, (2)  [J]; of a system whose energy is h = v.dL/dv - L the
  * second number is what is left of h. */
