@@ -1,6 +1,7 @@
 """Linear systems beside a start or an equilibrium."""
 
 import math
+from pathlib import Path
 
 import pytest
 
@@ -185,3 +186,22 @@ def test_a_linkage_has_the_linear_system_of_its_freedom(pendula, tmp_path):
         assert [row[0] for row in basis["T"][:3]] == pytest.approx([1, -1 / 3, 0], abs=1e-15)
     text = pendula("linearize", "slider.toml").out
     assert "T, of their deviations T x: the constraints leave x free" in text
+
+
+@pytest.mark.parametrize(("start", "growth"), [("50 deg", 0), ("-40 deg", 0), ("-100 deg", 6.94329)])
+def test_a_four_bar_rests_where_weights_do_no_work(start, growth, pendula):
+    found = pendula(
+        "linearize",
+        Path(__file__).parents[2] / "examples/four_bar.toml",
+        *("--at", "equilibrium", "--json"),
+        *("--set", f'start.theta_1="{start}"', "--set", "start.theta_dot_1=0.0"),
+    ).json
+    angles, masses, lengths = found["basis"]["state"][:3], (0.4, 1.1, 0.8), (0.4, 1.1, 0.8)
+    # Virtual work: the weights of bars, halfway along them, as the bars' turns lower them.
+    turns = [row[0] for row in found["basis"]["T"][:3]]
+    falls = [
+        length * math.sin(angle) * turn for length, angle, turn in zip(lengths, angles, turns, strict=True)
+    ]
+    work = sum(mass * (sum(falls[:k]) + falls[k] / 2) for k, mass in enumerate(masses))
+    assert work == pytest.approx(0, abs=1e-13)  # measured up to 1.6e-16
+    assert max(real for real, _ in found["eigenvalues"]) == pytest.approx(growth, abs=1e-5)

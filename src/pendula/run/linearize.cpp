@@ -39,13 +39,17 @@ class Beside {
     return slopes_.constraint_rates(motion_.time, motion_.q.data(), v.data());
   }
 
-  /// Of the momenta, M v + …, by coordinates, where rates are `v`  (n x n).
-  Directions<> momentum(const Eigen::VectorXd& v) const {
+  /// Forces, and what they and the momenta, M v + …, change by with coordinates, where rates are `v`  (n x n).
+  struct Forces {
+    Eigen::VectorXd f;
+    Directions<> f_D_q, p_D_q;
+  };
+  Forces forces(const Eigen::VectorXd& v) const {
     Eigen::VectorXd p(n_), f(n_);
     Directions<> p_D_q(n_, n_), p_D_v(n_, n_), f_D_q(n_, n_), f_D_v(n_, n_);
     here_(&SystemFunctions::momentum_form_with_jacobians, motion_.q.data(), v.data(), p.data(), f.data(), p_D_q.data(),
           p_D_v.data(), f_D_q.data(), f_D_v.data());
-    return p_D_q;
+    return {f, f_D_q, p_D_q};
   }
 
  private:
@@ -143,13 +147,10 @@ class ConstraintsBeside {
   /// Makes derivatives of accelerations without constraints  (n x 2n) those of accelerations with them.
   ///   M (δa − δa_free) = −(δM) M⁻¹Gᵀλ + (δG)ᵀ λ + Gᵀ δλ,   G δa + (δG) a + δ(d²g/dt² without accelerations) = 0.
   void constrain(const Motion& motion, Directions<>& acceleration) {
-    Eigen::VectorXd free(n_), lambda(m_);
-    beside_.here()(&SystemFunctions::acceleration, motion.q.data(), motion.v.data(), free.data());
-    forces_.find(beside_.here(), motion.q.data(), motion.v.data(), free.data(), lambda.data());
+    const auto [free, lambda] = pull(motion);
     const Eigen::VectorXd none = Eigen::VectorXd::Zero(n_), pulled = beside_.moved(slope_.transpose() * lambda);
-    Directions<> turned(n_, n_);
-    forces_.find_curvature(beside_.here(), motion.q.data(), lambda.data(), turned.data());
-    acceleration.leftCols(n_) += beside_.moved(turned - (beside_.momentum(pulled) - beside_.momentum(none)));
+    const Directions<> heavier = beside_.forces(pulled).p_D_q - beside_.forces(none).p_D_q;
+    acceleration.leftCols(n_) += beside_.moved(turned(motion, lambda) - heavier);
     Directions<> lacking = slope_ * acceleration + beside_.constraint_rates(motion.v).second;
     lacking.leftCols(n_) +=
         (beside_.constraint_rates(free + pulled).first - beside_.constraint_rates(none).first).leftCols(n_);
@@ -157,7 +158,28 @@ class ConstraintsBeside {
   }
   void constrain_inputs(Directions<>& by_inputs) const { by_inputs -= resisting_ * (slope_ * by_inputs); }
 
+  /// What the forces at a motion and their constraints' change by with coordinates, if λ is held  (n x n).
+  Directions<> stiffness(const Motion& motion) {
+    const Directions<> f_D_q = beside_.forces(motion.v).f_D_q;
+    return m_ == 0 ? f_D_q : Directions<>(f_D_q + turned(motion, pull(motion).second));
+  }
+
  private:
+  /// Accelerations without constraints, and λ.
+  std::pair<Eigen::VectorXd, Eigen::VectorXd> pull(const Motion& motion) {
+    Eigen::VectorXd free(n_), lambda(m_);
+    beside_.here()(&SystemFunctions::acceleration, motion.q.data(), motion.v.data(), free.data());
+    forces_.find(beside_.here(), motion.q.data(), motion.v.data(), free.data(), lambda.data());
+    return {free, lambda};
+  }
+
+  /// Σ_i λ_i ∂²g_i/∂q²
+  Directions<> turned(const Motion& motion, const Eigen::VectorXd& lambda) {
+    Directions<> found(n_, n_);
+    forces_.find_curvature(beside_.here(), motion.q.data(), lambda.data(), found.data());
+    return found;
+  }
+
   Eigen::Index n_, m_;
   ConstraintForces forces_;
   Beside& beside_;
@@ -252,26 +274,28 @@ Motion equilibrium(const Subject& subject, const Motion& near) {
   const Eigen::Index n = near.q.size();
   Motion at(near.time, near.q, Eigen::VectorXd::Zero(n));
   for (int k = 0; k < most; ++k) {
-    const auto [independent, a, b] = linearize(subject, at);
+    const SystemModel model = regular_model(subject, at);
+    Beside beside(model, at);
+    ConstraintsBeside constraints(model, at, beside);
+    const Independent independent = constraints.independent(at);
     const Eigen::Index d = std::ssize(independent.coordinates);
-    const Eigen::VectorXd acceleration = independent.rows(field_at(subject, at)).bottomRows(d);
-    if (!acceleration.allFinite() || !a.allFinite()) break;
-    const Eigen::MatrixXd stiffness = -a.bottomLeftCorner(d, d);
-    Eigen::VectorXd change =
-        independent.basis.topLeftCorner(n, d) * stiffness.completeOrthogonalDecomposition().solve(acceleration);
+    const Eigen::MatrixXd along = independent.basis.topLeftCorner(n, d);
+    const Eigen::VectorXd force = along.transpose() * beside.forces(at.v).f;
+    const Eigen::MatrixXd stiffness = -along.transpose() * constraints.stiffness(at) * along;
+    if (!force.allFinite() || !stiffness.allFinite()) break;
+    Eigen::VectorXd change = along * stiffness.completeOrthogonalDecomposition().solve(force);
     const double size = change.cwiseAbs().maxCoeff(), scale = std::max(1.0, at.q.cwiseAbs().maxCoeff());
     const double largest = (d < n ? 0.1 : 0.5) * scale;  // a linkage that jumps is another one
     if (size > largest) change *= largest / size;
     at.q += change;
     if (d < n && !bring_back_others(subject, independent, at)) break;
     if (size > smallest * scale) continue;
-    // Where accelerations cannot vanish, the iteration ends at a minimum of the sum of their squares.
-    const double swing = stiffness.cwiseAbs().maxCoeff();
-    if (acceleration.cwiseAbs().maxCoeff() > 1e-9 * swing * scale) break;
+    // Where forces cannot vanish, the iteration ends at a minimum of the sum of their squares.
+    if (force.cwiseAbs().maxCoeff() > 1e-9 * stiffness.cwiseAbs().maxCoeff() * scale) break;
     at.q = (at.q.array().abs() < smallest * scale).select(0, at.q);
     return at;
   }
-  throw std::invalid_argument("at: expected a start near an equilibrium, got one from which none was found");
+  throw std::invalid_argument("at: expected a start near an equilibrium, got one from which Newton's method finds none");
 }
 
 }  // namespace pendula

@@ -35,8 +35,8 @@ Linearized linearize(const Subject& subject, const Motion& motion);
 /// Eigenvalues of A  [1/s].
 Eigen::VectorXcd eigenvalues(const Directions<>& a);
 
-/// An equilibrium, by Newton's method on the accelerations, from a motion near it. Coordinates that the accelerations
-/// do not depend on keep their values. Throws NoKernel as linearize, std::invalid_argument where a system changes with
+/// An equilibrium, by Newton's method on the forces, from a motion near it. Coordinates that the forces do not depend
+/// on keep their values. Throws NoKernel as linearize, std::invalid_argument where a system changes with
 /// time, or where no equilibrium is found.
 Motion equilibrium(const Subject& subject, const Motion& near);
 
