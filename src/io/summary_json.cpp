@@ -166,7 +166,7 @@ constexpr std::array<std::string_view, 2> chain_spaces = {Planar::name, Spatial:
 constexpr SummaryScope anything = SummaryScope::anything, chains = SummaryScope::chains,
                        systems = SummaryScope::systems;
 
-constexpr std::array<JsonRow, 47> rows = {{
+constexpr std::array<JsonRow, 48> rows = {{
     {{"pendula", "string", "version"}, [](const Summary&) { return Json(version); }},
     {{"scenario", "string", "file, as it was named"}, [](const Summary& s) { return Json(s.model.scenario); }},
     {{"space", "string", "planar or spatial", "", chains, chain_spaces},
