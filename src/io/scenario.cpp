@@ -254,6 +254,9 @@ void close_start(const Sections& sections, Scenario<Space>& scenario) {
     sections.start.find("theta")->fail("angles that nearly close: they lead " + shortest(gap) +
                                        " beside where the last bob is held");
   }
+  if (closed.is_straight(start)) {
+    where.fail("a chain that can move, got one stretched straight between its ends");
+  }
   scenario.closed_by = (start.q - given).cwiseAbs().maxCoeff();
 }
 

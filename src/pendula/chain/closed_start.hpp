@@ -67,6 +67,14 @@ class ClosedStart {
     return true;
   }
 
+  /// Whether a state that closes is stretched straight between its ends, so that it cannot move.
+  bool is_straight(const State<Space>& state) const {
+    constexpr double least = 1e-9;  // how far the last bob gives way along its rod, relative to across
+    const PlacedRods<Space> placed(chain_, state);
+    const auto tip = HeldRods<RodState<Space>>::find_tip(placed.rods, placed.constants, [](int) { return 0.0; });
+    return !(tip.mobility.along() > least);
+  }
+
   /// Sets angles to those at which a chain hangs at rest between its hooks; empty if done, else why there are none.
   std::string hang(State<Space>& state) const {
     const double g = chain_.gravity();
