@@ -101,7 +101,7 @@ def test_the_last_bob_of_a_chain_may_be_held():
     assert run["force_end_y"][0] == pytest.approx(0.45 * 9.81, rel=1e-9)
     assert "end={" in repr(chain)
     assert chain != pendula.Chain(links=8, masses=0.1, lengths=0.25)
-    with pytest.raises(pendula.InputError, match=r"chain.end.at: expected a hook within 2"):
+    with pytest.raises(pendula.InputError, match=r"end.at: expected a point within 2 of the pivot"):
         pendula.Chain(links=8, lengths=0.25, end={"at": [3.0, 0.0]}).simulate(1.0, shape="hanging")
     with pytest.raises(pendula.InputError, match="did you mean at"):
         pendula.Chain(links=8, lengths=0.25, end={"att": [3.0, 0.0]}).simulate(1.0, theta=0.0)

@@ -255,7 +255,7 @@ void close_start(const Sections& sections, Scenario<Space>& scenario) {
                                        " beside where the last bob is held");
   }
   if (closed.is_straight(start)) {
-    where.fail("a chain that can move, got one stretched straight between its ends");
+    where.fail("a point to which the chain is not stretched straight, so that it can move");
   }
   scenario.closed_by = (start.q - given).cwiseAbs().maxCoeff();
 }

@@ -259,7 +259,7 @@ WRONG = {
     "both": ({"held": "at = [1.0, 0.0]\nring = true"}, "nothing beside ring"),
     "neither": ({"held": "ring = false"}, "chain.end.at"),
     "axes": ({"end": (1.0, 0.0, 0.0)}, "2 numbers"),
-    "hangs on a line": ({"end": (0.0, -1.0), "start": 'shape = "hanging"'}, "beside the vertical"),
+    "hangs on a line": ({"end": (0.0, -1.0), "start": 'shape = "hanging"'}, "a point beside the vertical"),
     "hangs by angles": ({"start": 'shape = "hanging"\ntheta = 1.0'}, "no angles beside"),
     "radau": ({"method": '"radau"', "step": 0.01}, "gauss"),
     "rk4": ({"method": '"rk4"', "step": 0.01}, "gauss"),

@@ -28,16 +28,15 @@ class ClosedStart {
  public:
   explicit ClosedStart(const Chain<Space>& chain) : chain_(chain), length_(chain.lengths().sum()) {}
 
-  /// Why no angles close at a time; empty where some do.
+  /// Where the hook should be instead, if no angles close at a time; empty where some do.
   std::string against(double time) const {
     const double far = place(time).norm(), longest = chain_.lengths().maxCoeff();
     if (far > length_) {
-      return "expected a hook within " + shortest(length_) + " of the pivot, the length of the chain, got one at " +
-             shortest(far);
+      return "a point within " + shortest(length_) + " of the pivot, the length of the chain";
     }
     if (longest - (length_ - longest) > far) {
-      return "expected a chain that can close, got one with a link of " + shortest(longest) +
-             ", longer than all others and the way to the hook together";
+      return "a point that the last bob reaches: a link of " + shortest(longest) +
+             " is longer than all others and the way there together";
     }
     return "";
   }
@@ -75,15 +74,16 @@ class ClosedStart {
     return !(tip.mobility.along() > least);
   }
 
-  /// Sets angles to those at which a chain hangs at rest between its hooks; empty if done, else why there are none.
+  /// Sets angles to those at which a chain hangs at rest between its hooks; empty if done, else what is expected
+  /// instead.
   std::string hang(State<Space>& state) const {
     const double g = chain_.gravity();
-    if (g == 0) return "expected gravity, by which a chain hangs, got none";
+    if (g == 0) return "some gravity, by which a chain hangs";
     const Vector hook = place(state.time);
     if (!(hook.template head<D - 1>().norm() > upright * length_)) {
-      return "expected a hook beside the vertical through the pivot, got one on it, where a chain hangs folded";
+      return "a point beside the vertical through the pivot: on it a chain hangs folded";
     }
-    if (!(hook.norm() < (1 - upright) * length_)) return "expected a chain longer than the way to its hook";
+    if (!(hook.norm() < (1 - upright) * length_)) return "a point nearer to the pivot than the chain is long";
     const double weight = std::abs(g) * chain_.mass_below()[0];
     Vector force = hook.normalized() * weight;
     force[D - 1] += g * chain_.mass_below()[0] / 2;
@@ -112,7 +112,7 @@ class ClosedStart {
       for (int a = 0; a < Space::dof; ++a) state.q[a * links + i] = q[static_cast<std::size_t>(a)];
     }
     if (close(state)) return "";
-    return "expected a chain that hangs, got one whose equilibrium was not found";
+    return "a point between which and the pivot the chain's equilibrium is found";
   }
 
  private:
