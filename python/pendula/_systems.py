@@ -319,7 +319,7 @@ class Chain(System):
         Torques that follow from the motion: ``input`` ("torque_1"), ``value`` (an expression of the columns),
         ``sample`` (s), ``limit``. They are held from sample to sample.
     end : mapping, optional
-        What holds the last bob: ``{"at": [1.2, 0.0]}``, in m from the pivot, or ``{"ring": True}`` for the pivot itself;
+        What holds the last bob: ``{"at": [1.2, 0.0]}``, in m from the pivot, or ``{"ring": True}``, the pivot itself.
         ``amplitude``, ``frequency``, ``phase`` by axis for a hook that moves. Without it the last bob hangs free.
         A start ``shape="hanging"`` needs no angles, then.
     units : {"SI", "natural"}
