@@ -1,5 +1,6 @@
 """Chains whose last bob is held, against methods that share nothing with the chain solver, and truths."""
 
+import json
 import math
 
 import numpy as np
@@ -242,6 +243,26 @@ def test_events_and_dense_output(chain, pendula, tmp_path):
     at = header.split(",").index("x_2")
     assert lines
     assert max(abs(float(line.split(",")[at]) - 0.62) for line in lines) < 1e-12
+
+
+@pytest.mark.parametrize("moves", ["", MOVES], ids=["resting", "moving"])
+def test_a_resumed_run_is_the_same_to_the_bit(moves, chain, pendula, tmp_path):
+    file = chain(held=f"at = {list(ENDS['planar'])}\n{moves}", step=0.01, stages=3, duration=2.0)
+    whole = pendula("simulate", file, "--set=run.duration=3.0", "--set=output.every=100", "--json")
+    first = pendula("simulate", file, "--set=output.every=100", "-o", tmp_path / "run.h5", "--quiet")
+    assert first.returncode == 0, first.stderr
+    rest = pendula("simulate", "--resume", tmp_path / "run.h5", "--set=run.duration=3.0", "--json")
+    assert json.loads(rest.stdout)["final"] == json.loads(whole.stdout)["final"]
+
+
+def test_steps_too_long_for_a_fixed_point_become_shorter(chain, simulate):
+    """Forty links, whose fastest mode goes round in a few steps."""
+    many = {"masses": (0.02,) * 40, "lengths": (0.05,) * 40, "end": (1.4, 0.3)}
+    start = 'shape = "hanging"\ntheta_dot = 1.0'
+    run = simulate(chain(start=start, step=0.03, stages=4, duration=1.0, **many))
+    assert run["rejected_steps"] > 0
+    assert run["energy_error_max"] < 1e-6
+    assert max(run["constraint_error"].values()) < 1e-14
 
 
 WRONG = {
