@@ -4,12 +4,12 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
-#include <pendula/chain/closed_start.hpp>
 #include <pendula/chain/momenta.hpp>
 #include <pendula/numeric/number_text.hpp>
 #include <stdexcept>
 #include <utility>
 
+#include "io/end_reader.hpp"
 #include "io/section.hpp"
 #include "io/system_reader.hpp"
 
@@ -81,11 +81,6 @@ LinkCount link_count(const Sections& sections) {
   return {};
 }
 
-/// Whether the start is that of a chain that hangs between its hooks.
-bool hangs(const Section& start) {
-  return start.choice("shape") == 1;
-}
-
 /// Keys without a default come first, so that a file that lacks one is not told about the number of links.
 void require_keys(const Sections& sections) {
   sections.chain.require("masses");
@@ -138,30 +133,6 @@ ChainParameters<Space> read_chain(const Section& chain, const LinkCount& count) 
   parameters.damping = chain.per_link("damping", count);
   parameters.torque = constant_torque<Space>(chain, count);
   return parameters;
-}
-
-/// What holds the last bob, if something does.
-template <class Space>
-std::optional<ChainEnd> read_end(const Section& chain) {
-  if (!chain.find("end")) return {};
-  const Section end(chain, "end");
-  const bool is_ring = end.truth("ring");
-  ChainEnd read;
-  const auto take = [&](std::string_view key, std::array<double, 3>& numbers) {
-    const std::optional<Entry> entry = end.find(key);
-    if (!entry) return false;
-    const Eigen::VectorXd given = entry->vector(Space::dimension);
-    std::ranges::copy(given, numbers.begin());
-    return true;
-  };
-  if (is_ring && end.find("at")) end.find("at")->fail("nothing beside ring = true, which is held at the pivot");
-  if (!is_ring) end.require("at");
-  take("at", read.at);
-  const bool moves = take("amplitude", read.amplitude);
-  const bool has_frequency = take("frequency", read.frequency), has_phase = take("phase", read.phase);
-  if (moves && !has_frequency) end.require("frequency");
-  if (!moves && (has_frequency || has_phase)) end.require("amplitude");
-  return read;
 }
 
 std::optional<Entry> natural_requested(const Section& chain) {
@@ -227,37 +198,6 @@ State<Space> read_start(const Section& start, const LinkCount& count, const Chai
   const Coordinates<Space, Eigen::Dynamic> q = read_coordinates<Space>(start, angle_keys, count);
   if (first_of(start, momentum_keys)) return {0, q, rates_from_momenta(start, count, chain, q)};
   return {0, q, read_coordinates<Space>(start, rate_keys, count)};
-}
-
-/// Brings the start of a chain whose last bob is held to where it is.
-template <class Space>
-void close_start(const Sections& sections, Scenario<Space>& scenario) {
-  const bool has_to_hang = hangs(sections.start);
-  if (!scenario.chain.is_held()) {
-    if (has_to_hang) sections.start.find("shape")->fail("angles for a chain whose end is free; chain.end holds it");
-    return;
-  }
-  const Section end(sections.chain, "end");
-  const Entry where = end.find("at") ? *end.find("at") : *end.find("ring");
-  const ClosedStart<Space> closed(scenario.chain);
-  State<Space>& start = scenario.start;
-  if (const std::string against = closed.against(start.time); !against.empty()) where.fail(against);
-  if (has_to_hang) {
-    if (const auto theta = first_of(sections.start, angle_keys)) theta->fail("no angles beside shape = \"hanging\"");
-    if (const std::string against = closed.hang(start); !against.empty()) where.fail(against);
-    scenario.hangs = true;
-    return;
-  }
-  const auto given = start.q;
-  const double gap = closed.gap(start);
-  if (!closed.close(start)) {
-    sections.start.find("theta")->fail("angles that nearly close: they lead " + shortest(gap) +
-                                       " beside where the last bob is held");
-  }
-  if (closed.is_straight(start)) {
-    where.fail("a point to which the chain is not stretched straight, so that it can move");
-  }
-  scenario.closed_by = (start.q - given).cwiseAbs().maxCoeff();
 }
 
 /// Names each key once.
@@ -427,7 +367,7 @@ Scenario<Space> read(Sections& sections, const std::filesystem::path& folder) {
   scenario.feedback = read_feedback(sections.chain);
   scenario.signals = read_signals(sections.chain, folder);
   read_plan(sections, scenario);
-  close_start(sections, scenario);
+  close_start(sections.chain, sections.start, scenario);
   scenario.natural = natural;
   for (std::string& warning : degree_warnings(sections.start)) scenario.warnings.push_back(std::move(warning));
   scenario.places["links"] = count.place;
