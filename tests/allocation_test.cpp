@@ -93,6 +93,28 @@ TEST(Allocation, NoneInAStepOfTheChainSolver) {
   }
 }
 
+/// A chain held where its last bob is at the start, by a hook that moves.
+template <class Space>
+void expect_none_where_the_end_is_held(Random& random) {
+  const Chain<Space> free = random_chain<Space>(random, 5, false);
+  const State<Space> start = random_state<Space>(random, 5);
+  ChainParameters<Space> parameters{free.masses(), free.lengths()};
+  parameters.end = ChainEnd{.amplitude = {0.01, 0.02, 0.01}, .frequency = {1, 2, 3}};
+  const Points<Space, Eigen::Dynamic> bobs = bob_positions(free, start);
+  std::copy_n(bobs.col(4).data(), Space::dimension, parameters.end->at.data());
+  for (int stages = 1; stages <= 8; ++stages) {
+    RunOptions options = gauss(stages);
+    options.solver = Solver::chain;
+    EXPECT_EQ(allocations_in_steps(Chain<Space>(parameters), start, options), 0) << stages << " stages";
+  }
+}
+
+TEST(Allocation, NoneInAStepOfAChainWhoseEndIsHeld) {
+  Random random(3);
+  expect_none_where_the_end_is_held<Planar>(random);
+  expect_none_where_the_end_is_held<Spatial>(random);
+}
+
 TEST(Allocation, NoneInAStepOfFixedSize) {
   const Chain<Spatial, 3> chain({.masses = Eigen::Vector3d::Ones(),
                                  .lengths = Eigen::Vector3d::Ones(),

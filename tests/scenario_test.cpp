@@ -180,7 +180,7 @@ TEST(Scenario, DefaultsAreThoseOfTheTableOfKeys) {
       ++tried;
     }
   }
-  EXPECT_EQ(tried, 14);
+  EXPECT_EQ(tried, 15);
   EXPECT_EQ(without.chain.gravity(), ChainParameters<Planar>{}.gravity);
   EXPECT_EQ(without.options.tolerance, std::get<double>(find_key("run.tolerance")->otherwise));
 }
@@ -267,15 +267,15 @@ TEST(Scenario, BadValuesAreToldByFileLineKeyExpectedAndGot) {
       // unknown keys, with the one that may be meant
       {"masses  =", "mases =",
        "file.toml:4: chain.mases: expected one of space, links, masses, lengths, gravity, damping, "
-       "torque, units, drive, feedback, signal, got the unknown key \"mases\" (did you mean masses?)"},
+       "torque, units, end, drive, feedback, signal, got the unknown key \"mases\" (did you mean masses?)"},
       {"units   =", "theta =",
        "file.toml:9: chain.theta: expected one of space, links, masses, lengths, gravity, damping, "
-       "torque, units, drive, feedback, signal, got the unknown key \"theta\" (did you mean start.theta?)"},
+       "torque, units, end, drive, feedback, signal, got the unknown key \"theta\" (did you mean start.theta?)"},
       {"phase = 0.4", "delay = 0.4",
        "file.toml:15: chain.drive[1].delay: expected one of link, amplitude, frequency, "
        "phase, got the unknown key \"delay\""},
       {"theta_dot =", "theta_dto =",
-       "file.toml:20: start.theta_dto: expected one of theta, phi, theta_dot, phi_dot, p_theta, p_phi, got "
+       "file.toml:20: start.theta_dto: expected one of shape, theta, phi, theta_dot, phi_dot, p_theta, p_phi, got "
        "the unknown key \"theta_dto\" (did you mean theta_dot?)"},
       // missing keys
       {"space   = \"spatial\"", "", "file.toml:1: chain.space: expected \"planar\" or \"spatial\", got no such key"},

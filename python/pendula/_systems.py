@@ -318,6 +318,10 @@ class Chain(System):
     feedback : sequence of mappings, optional
         Torques that follow from the motion: ``input`` ("torque_1"), ``value`` (an expression of the columns),
         ``sample`` (s), ``limit``. They are held from sample to sample.
+    end : mapping, optional
+        What holds the last bob: ``{"at": [1.2, 0.0]}``, in m from the pivot, or ``{"ring": True}``, the pivot itself.
+        ``amplitude``, ``frequency``, ``phase`` by axis for a hook that moves. Without it the last bob hangs free.
+        A start ``shape="hanging"`` needs no angles, then.
     units : {"SI", "natural"}
     """
 
@@ -333,6 +337,7 @@ class Chain(System):
         torque: ArrayLike | None = None,
         drives: Sequence[Mapping[str, object]] = (),
         feedback: Sequence[Mapping[str, object]] = (),
+        end: Mapping[str, object] | None = None,
         units: str | None = None,
         **others: Never,
     ) -> None:
@@ -350,11 +355,12 @@ class Chain(System):
                 "units": units,
             }
         )
+        self._end = None if end is None else copy.deepcopy(mapping("end", end))
         self._drives = tables_of("drives", drives)
         self._feedback = tables_of("feedback", feedback)
         self._signals: Signals = {}
         if self._tells_links():
-            self._require_right(self.tables())
+            self._require_right(self._without("chain.end"))  # where it is, a start at zero does not close
         else:  # a start will tell the number of links
             self._require_right({"chain": {**self._numbers, "links": 1}})
 
@@ -369,13 +375,13 @@ class Chain(System):
         return self._numbers["links"] is not None or any(arrays)
 
     def __repr__(self) -> str:
-        given = {**self._numbers, "drives": self._drives, "feedback": self._feedback}
+        given = {**self._numbers, "drives": self._drives, "feedback": self._feedback, "end": self._end}
         told = ", ".join(f"{key}={one!r}" for key, one in given.items() if one is not None and one != [])
         return f"Chain({told})"
 
     @cached_property
     def _info(self) -> _core.Prepared:
-        tables = {key: one for key, one in self.tables().items() if key != "chain.feedback"}
+        tables = self._without("chain.feedback", "chain.end")
         text = _toml.document({**tables, "start": self.at_zero(), "run": {"duration": 1.0}})
         with plainly():
             return _core.prepare(text, "pendula", [], *places(), tell)
@@ -433,16 +439,22 @@ class Chain(System):
             tables["chain"] = {**self._numbers, **self.parameters, "links": None}
         return _toml.document(tables)
 
+    def _without(self, *names: str) -> Tables:
+        return {key: one for key, one in self.tables().items() if key not in names}
+
     def start_names(self) -> list[str]:
-        return [
+        shape = [] if self._end is None else ["shape"]
+        return shape + [
             form.format(angle)
             for form in ("{}", "{}_dot", "p_{}")
             for angle in (("theta", "phi") if self._numbers["space"] == "spatial" else ("theta",))
         ]
 
     def tables(self) -> Tables:
+        end: Tables = {} if self._end is None else {"chain.end": dict(self._end)}
         return {
             "chain": dict(self._numbers),
+            **end,
             "chain.drive": list(self._drives),
             "chain.feedback": list(self._feedback),
             "chain.signal": list(self._signals.values()),

@@ -92,3 +92,16 @@ def test_a_system_without_a_start_at_zero_is_one(tmp_path):
 def test_what_is_public_is_shown():
     assert sorted(dir(pendula)) == sorted([*pendula.__all__, "map"])
     assert "model" in dir(pendula) and all(hasattr(pendula, name) for name in dir(pendula))
+
+
+def test_the_last_bob_of_a_chain_may_be_held():
+    chain = pendula.Chain(links=8, masses=0.1, lengths=0.25, end={"at": [1.2, 0.0]})
+    run = chain.simulate(1.0, shape="hanging")
+    assert np.ptp(run["theta_3"]) < 1e-13  # measured 6.7e-16
+    assert run["force_end_y"][0] == pytest.approx(0.45 * 9.81, rel=1e-9)
+    assert "end={" in repr(chain)
+    assert chain != pendula.Chain(links=8, masses=0.1, lengths=0.25)
+    with pytest.raises(pendula.InputError, match=r"end.at: expected a point within 2 of the pivot"):
+        pendula.Chain(links=8, lengths=0.25, end={"at": [3.0, 0.0]}).simulate(1.0, shape="hanging")
+    with pytest.raises(pendula.InputError, match="did you mean at"):
+        pendula.Chain(links=8, lengths=0.25, end={"att": [3.0, 0.0]}).simulate(1.0, theta=0.0)

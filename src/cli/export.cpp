@@ -95,6 +95,11 @@ template <class Space>
 Words scenario_words(const io::Scenario<Space>& scenario, const std::string& file) {
   const Chain<Space>& chain = scenario.chain;
   if (scenario.natural) refuse(file, "chain.units: expected \"SI\", got \"natural\"");
+  if (chain.is_held()) {
+    refuse(file,
+           "chain.end: expected a chain that hangs free, got one whose last bob is held; the model hanging_chain can "
+           "be exported");
+  }
   Words words = {"--space", Space::dof == 1 ? "planar" : "spatial", "--links", std::to_string(chain.links())};
   const Words sampled = sampled_words(scenario.feedback, ChainSubject<Space>(chain));
   words.insert(words.end(), sampled.begin(), sampled.end());

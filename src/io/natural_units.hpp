@@ -57,6 +57,7 @@ inline std::string in_units(const std::optional<NaturalUnits>& natural, const st
   if (unit == "kg") return alone(names.mass);
   if (unit == "J" || unit == "N m") return alone(names.energy);
   if (unit == "N m s/rad") return alone(names.energy) + " " + alone(names.time) + " / rad";
+  if (unit == "N") return alone(names.mass) + " g";
   if (unit == "1/s") return "1 / " + alone(names.time);
   if (unit == "m/s^2") return "g";
   if (unit == "rad/s") return "rad / " + alone(names.time);

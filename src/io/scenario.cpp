@@ -9,6 +9,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include "io/end_reader.hpp"
 #include "io/section.hpp"
 #include "io/system_reader.hpp"
 
@@ -84,7 +85,7 @@ LinkCount link_count(const Sections& sections) {
 void require_keys(const Sections& sections) {
   sections.chain.require("masses");
   sections.chain.require("lengths");
-  sections.start.require("theta");
+  if (!hangs(sections.start)) sections.start.require("theta");
 }
 
 /// Constant torque on each link: in the plane a number, in space a vector, or one of them for all links.
@@ -194,7 +195,7 @@ State<Space> read_start(const Section& start, const LinkCount& count, const Chai
     constexpr std::array<std::string_view, 3> spatial_keys = {"phi", "phi_dot", "p_phi"};
     if (const auto entry = first_of(start, spatial_keys)) entry->fail("no such key in a planar scenario");
   }
-  const auto q = read_coordinates<Space>(start, angle_keys, count);
+  const Coordinates<Space, Eigen::Dynamic> q = read_coordinates<Space>(start, angle_keys, count);
   if (first_of(start, momentum_keys)) return {0, q, rates_from_momenta(start, count, chain, q)};
   return {0, q, read_coordinates<Space>(start, rate_keys, count)};
 }
@@ -360,11 +361,13 @@ Scenario<Space> read(Sections& sections, const std::filesystem::path& folder) {
   for (const Section& table : sections.chain.each("drive")) {
     parameters.drives.push_back(read_drive<Space>(table, count));
   }
+  parameters.end = read_end<Space>(sections.chain);
   const Chain<Space> chain = build_chain(sections.chain, std::move(parameters));
   Scenario<Space> scenario(chain, read_start(sections.start, count, chain));
   scenario.feedback = read_feedback(sections.chain);
   scenario.signals = read_signals(sections.chain, folder);
   read_plan(sections, scenario);
+  close_start(sections.chain, sections.start, scenario);
   scenario.natural = natural;
   for (std::string& warning : degree_warnings(sections.start)) scenario.warnings.push_back(std::move(warning));
   scenario.places["links"] = count.place;

@@ -50,6 +50,8 @@ template <class Space>
 struct Scenario : RunPlan {
   Chain<Space> chain;
   State<Space> start;
+  double closed_by = 0;  ///< the largest change of an angle that brought the end to its hook  [rad]
+  bool hangs = false;    ///< whether angles are those of a chain at rest between its hooks
 
   Scenario(Chain<Space> moved, State<Space> from) : chain(std::move(moved)), start(std::move(from)) {}
 };

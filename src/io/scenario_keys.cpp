@@ -60,7 +60,7 @@ constexpr std::array<ScenarioKey, 7> document = {
 constexpr std::array<std::string_view, 2> spaces = {Planar::name, Spatial::name};
 constexpr std::array<std::string_view, 2> unit_systems = {"SI", "natural"};
 
-constexpr std::array<ScenarioKey, 11> chain = {
+constexpr std::array<ScenarioKey, 12> chain = {
     one_of("space", spaces, required, "planar (y up) or spatial (z up)"),
     an_integer("links", 1, max_links, InWords{"the length of the first array"},
                "the number of links, where no array tells it"),
@@ -70,9 +70,25 @@ constexpr std::array<ScenarioKey, 11> chain = {
     each_link("damping", "N m s/rad", not_negative, 0.0, "slows each link by this times its angular velocity"),
     {.name = "torque", .type = torque, .unit = "N m", .otherwise = 0.0, .hint = "constant torque on each link"},
     one_of("units", unit_systems, unit_systems[0], "of all other tables and of all output"),
+    another("end", table, InWords{"the last bob hangs free"}, "what holds the last bob"),
     another("drive", tables, none, "torques amplitude sin(frequency t + phase), each on one link"),
     another("feedback", tables, none, "torques that follow from the motion"),
     another("signal", tables, none, "torques from measured numbers"),
+};
+
+/// A key with a number an axis.
+constexpr ScenarioKey each_axis(std::string_view name, std::string_view unit, Otherwise otherwise,
+                                std::string_view hint) {
+  return {.name = name, .type = numbers, .unit = unit, .otherwise = otherwise, .hint = hint};
+}
+
+constexpr std::array<ScenarioKey, 5> chain_end = {
+    each_axis("at", "m", InWords{"must be given without ring"}, "where it is held: [x, y], in space [x, y, z]"),
+    another("ring", truth, false, "whether it is held at the pivot, in place of at"),
+    each_axis("amplitude", "m", InWords{"it rests"},
+              "how far it moves along each axis: amplitude sin(frequency t + phase)"),
+    each_axis("frequency", "rad/s", InWords{"must be given with an amplitude"}, "angular frequencies of that"),
+    each_axis("phase", "rad", InWords{"0 along each axis"}, "phases of that at t = 0"),
 };
 
 constexpr std::array<ScenarioKey, 4> chain_drive = {
@@ -130,8 +146,12 @@ constexpr std::array<ScenarioKey, 4> chain_feedback = {
     a_number("limit", "N m", positive, none, "the largest size of the value"),
 };
 
-constexpr std::array<ScenarioKey, 6> start = {
-    each_link("theta", "rad", any_number, required, "the angles at the start, from the downward vertical"),
+constexpr std::array<std::string_view, 2> shapes = {"angles", "hanging"};
+
+constexpr std::array<ScenarioKey, 7> start = {
+    one_of("shape", shapes, shapes[0], "by angles, or as a chain hangs at rest between the pivot and its end"),
+    each_link("theta", "rad", any_number, InWords{"must be given, unless it hangs"},
+              "the angles at the start, from the downward vertical"),
     each_link("phi", "rad", any_number, 0.0, "angles around the vertical, in space only"),
     each_link("theta_dot", "rad/s", any_number, 0.0, "rates of theta"),
     each_link("phi_dot", "rad/s", any_number, 0.0, "rates of phi, in space only"),
@@ -237,9 +257,10 @@ constexpr std::array<ScenarioKey, 5> ensemble_random = {
 constexpr std::array<std::string_view, 4> commands = {"simulate", "ensemble", "lyapunov", "linearize"};
 constexpr Names all_commands = commands, of_rows = Names(commands).first(2), of_members = Names(commands).subspan(1, 1);
 
-constexpr std::array<ScenarioTable, 17> tables_of_scenarios = {{
+constexpr std::array<ScenarioTable, 18> tables_of_scenarios = {{
     {"", all_commands, document},
     {"chain", all_commands, chain},
+    {"chain.end", all_commands, chain_end},
     {"chain.drive", all_commands, chain_drive},
     {"chain.feedback", of_rows, chain_feedback},
     {"chain.signal", all_commands, chain_signal},

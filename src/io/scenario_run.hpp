@@ -102,6 +102,8 @@ inline void describe_acting(const RunPlan& plan, ModelSummary& model) {
 template <class Space>
 void describe(const Scenario<Space>& scenario, const std::string& file, Summary& summary) {
   summary.model = model_summary(file, scenario.chain, scenario.natural);
+  summary.model.closed_by = scenario.closed_by;
+  summary.model.hangs = scenario.hangs;
   describe_acting(scenario, summary.model);
   summary.final = snapshot(scenario.chain, summary.last);
 }

@@ -81,9 +81,20 @@ std::string what_was_moved(const ModelSummary& model) {
   }
   const UnitNames unit = unit_names(model.natural);
   const std::string acceleration = model.natural ? " g" : " m/s^2";
+  std::string held;
+  if (model.constraints > 0) {
+    held = line("end held", std::to_string(model.constraints) + " constraints",
+                plural(model.degrees_of_freedom, "degree") + " of freedom");
+    held += line("start", model.hangs ? "as it hangs at rest"
+                          : model.closed_by > 0
+                              ? "angles changed to close, by at most " + rounded(model.closed_by, 2) + " rad"
+                              : "angles as given");
+  }
   return line("chain", model.space + ", " + plural(model.links, "link") + ", mass " + rounded(model.mass) +
                            std::string(unit.mass) + ", length " + rounded(model.length) + std::string(unit.length) +
-                           ", gravity " + rounded(model.gravity) + acceleration + (model.loaded ? ", with loads" : ""));
+                           ", gravity " + rounded(model.gravity) + acceleration +
+                           (model.loaded ? ", with loads" : "")) +
+         held;
 }
 
 std::string settings(const Summary& summary) {

@@ -29,7 +29,9 @@ struct ModelSummary {
   std::vector<std::pair<std::string, std::vector<double>>> parameters;  ///< of a system that is no chain
   std::vector<std::pair<std::string, double>> assembled;                ///< of its start, by constraints
   std::vector<std::pair<std::string, double>> guesses;                  ///< of the first of these, the coordinates
-  int constraints = 0, degrees_of_freedom = 0;                          ///< of a system that is no chain
+  int constraints = 0, degrees_of_freedom = 0;
+  double closed_by = 0;  ///< of a chain whose end is held: the largest change of an angle of its start  [rad]
+  bool hangs = false;    ///< the same: whether it starts as it hangs at rest
   int links = 0;
   double mass = 0;    ///< Σ m_i
   double length = 0;  ///< Σ l_i
@@ -103,7 +105,9 @@ ModelSummary model_summary(const std::string& scenario, const Chain<Space>& chai
   model.mass = chain.masses().sum();
   model.length = chain.lengths().sum();
   model.gravity = chain.gravity();
-  model.loaded = chain.loaded();
+  model.loaded = chain.exchanges_energy();
+  model.constraints = chain.is_held() ? Space::dimension : 0;
+  model.degrees_of_freedom = chain.degrees_of_freedom();
   model.natural = natural;
   return model;
 }

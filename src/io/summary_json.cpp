@@ -166,7 +166,7 @@ constexpr std::array<std::string_view, 2> chain_spaces = {Planar::name, Spatial:
 constexpr SummaryScope anything = SummaryScope::anything, chains = SummaryScope::chains,
                        systems = SummaryScope::systems;
 
-constexpr std::array<JsonRow, 47> rows = {{
+constexpr std::array<JsonRow, 48> rows = {{
     {{"pendula", "string", "version"}, [](const Summary&) { return Json(version); }},
     {{"scenario", "string", "file, as it was named"}, [](const Summary& s) { return Json(s.model.scenario); }},
     {{"space", "string", "planar or spatial", "", chains, chain_spaces},
@@ -179,15 +179,16 @@ constexpr std::array<JsonRow, 47> rows = {{
      [](const Summary& s) { return to_json(s.model.natural); }},
     {{"parameters", parameters_schema, "of the model, by name", "", systems},
      [](const Summary& s) { return named(s.model.parameters); }},
-    {{"degrees_of_freedom", "integer", "coordinates less the constraints that do not follow from others at the start",
-      "", systems},
+    {{"degrees_of_freedom", "integer", "coordinates less the constraints that do not follow from others at the start"},
      [](const Summary& s) { return Json(s.model.degrees_of_freedom); }},
+    {{"closed_by", "number null", "largest change of an angle by which the start came to where the end is held", "rad",
+      chains},
+     [](const Summary& s) { return where(s.model.constraints > 0 && !s.model.hangs, s.model.closed_by); }},
     {{"assembled", numbers_schema, "coordinates and rates of the start that constraints gave", "", systems},
      [](const Summary& s) { return named(s.model.assembled); }},
     {{"guesses", numbers_schema, "of these coordinates, from which they were found", "", systems},
      [](const Summary& s) { return named(s.model.guesses); }},
-    {{"constraint_error", constraint_schema, "largest after a step, each in its unit; null without constraints", "",
-      systems},
+    {{"constraint_error", constraint_schema, "largest after a step, each in its unit; null without constraints"},
      [](const Summary& s) { return constraint_errors(s); }},
     {{"feedback", texts_schema, "inputs that have some"}, [](const Summary& s) { return Json(s.model.feedback); }},
     {{"signals", texts_schema, "inputs that follow some"}, [](const Summary& s) { return Json(s.model.signals); }},

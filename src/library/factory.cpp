@@ -48,13 +48,27 @@ std::unique_ptr<PlainIntegrator> make_explicit(const PlainChain& plain, const Ru
   return make_explicit_chain(chain, options);
 }
 
+// The end of a chain is held by Gauss steps in rods alone.
+void require_gauss(const RunOptions& options) {
+  const auto refuse = [](const char* key, std::string_view expected, std::string_view got) {
+    throw std::invalid_argument(std::string(key) + ": expected " + std::string(expected) +
+                                " for a chain whose end is held, got " + std::string(got));
+  };
+  if (options.method != Method::gauss) refuse("method", "gauss or auto", name_of(options.method));
+  if (options.form != Form::momentum) refuse("form", "momentum", name_of(options.form));
+  if (options.solver == Solver::dense) refuse("solver", "chain or auto", name_of(options.solver));
+  if (options.iteration == Iteration::newton) refuse("iteration", "fixed-point or auto", name_of(options.iteration));
+}
+
 }  // namespace
 
 template <class Space>
 std::unique_ptr<PlainIntegrator> make_plain_integrator(const PlainChain& chain, const RunOptions& options) {
+  if (chain.end != nullptr) require_gauss(options);
   if (is_explicit(options.method)) return make_explicit<Space>(chain, options);
   require_stages(options.stages);
-  if (solver_for<Space>(chain.links, options, kernel_of<Space>(chain.links) != nullptr) == Solver::chain)
+  if (chain.end != nullptr ||
+      solver_for<Space>(chain.links, options, kernel_of<Space>(chain.links) != nullptr) == Solver::chain)
     return make_chain_integrator(chain_of<Space>(chain), options);
   return make_over<Space>(require_kernel<Space>(chain.links), chain, options);
 }

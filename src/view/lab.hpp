@@ -68,6 +68,7 @@ std::vector<std::string> lab_leaves_out(const Chain<Space>& chain) {
   const auto damping = chain.damping().array();
   if (chain.links() > most_links) words.push_back("links after the " + std::to_string(most_links) + "th");
   if ((damping != damping[0]).any()) words.emplace_back("damping of single links: all have that of the first");
+  if (chain.is_held()) words.emplace_back("what holds the last bob");
   if (std::abs(chain.gravity()) > most_gravity) words.emplace_back("gravity beyond 100");
   if (damping[0] > most_damping) words.emplace_back("damping beyond 1000");
   if ((chain.masses().array() >= most_size).any() || (chain.lengths().array() >= most_size).any()) {

@@ -16,7 +16,7 @@ INPUTS = [
         "masses  = [1.0, 1.0]",
         "mases = [1.0, 1.0]",
         "3: chain.mases",
-        "one of space, links, masses, lengths, gravity, damping, torque, units, drive, feedback, signal",
+        "one of space, links, masses, lengths, gravity, damping, torque, units, end, drive, feedback, signal",
         'the unknown key "mases" (did you mean masses?)',
     ),
     ("masses  = [1.0, 1.0]", "", "1: chain.masses", "the masses of the bobs", "no such key"),

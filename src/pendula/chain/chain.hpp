@@ -3,6 +3,9 @@
 #include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
+#include <optional>
+#include <pendula/chain/chain_end.hpp>
 #include <pendula/chain/space.hpp>
 #include <stdexcept>
 #include <string>
@@ -31,6 +34,7 @@ struct ChainParameters {
   /// Constant torque, or empty for none  N m
   Torque<Space, N> torque = Torque<Space, N>::Zero(Space::torque_components, at_first);
   std::vector<Drive<Space>> drives = {};  ///< sinusoidal torques
+  std::optional<ChainEnd> end = {};       ///< what holds the last bob; nothing for one that hangs free
 
  private:
   static constexpr Eigen::Index at_first = N == Eigen::Dynamic ? 0 : N;
@@ -66,17 +70,25 @@ class Chain {
   /// Whether the torque depends on time.
   bool driven() const { return !parameters_.drives.empty(); }
 
-  /// Highest frequency of a drive; 0 where there is none  [rad/s].
+  /// Highest frequency of a drive or of the end; 0 where there is none  [rad/s].
   double fastest_drive() const {
     double fastest = 0;
     for (const Drive<Space>& drive : drives()) {
       if (drive.amplitude.any()) fastest = std::max(fastest, std::abs(drive.frequency));
     }
-    return fastest;
+    return end() ? std::max(fastest, end()->fastest()) : fastest;
   }
 
-  /// Whether anything but gravity acts: damping, torque or a drive.
+  /// Whether anything but gravity acts on links: damping, torque or a drive.
   bool loaded() const { return loaded_; }
+
+  /// What holds the last bob; nothing where it hangs free.
+  const std::optional<ChainEnd>& end() const { return parameters_.end; }
+  bool is_held() const { return end().has_value(); }
+  /// Whether energy is not conserved: by loads, or by an end that moves.
+  bool exchanges_energy() const { return loaded_ || (end() && end()->moves()); }
+  /// Coordinates less the constraints by the end.
+  int degrees_of_freedom() const { return Space::dof * links() - (is_held() ? Space::dimension : 0); }
 
   /// Whether damping acts.
   bool damped() const { return (damping().array() != 0).any(); }
@@ -134,6 +146,16 @@ class Chain {
     if (!std::isfinite(gravity())) reject("gravity: expected a finite number");
     if (!parameters_.torque.allFinite()) reject("torque: expected finite numbers");
     for (const Drive<Space>& drive : drives()) validate(drive);
+    if (end()) validate(*end());
+  }
+
+  void validate(const ChainEnd& end) const {
+    if (links() < 2) reject("end: expected two links at least where the last bob is held, got one");
+    for (const auto* numbers : {&end.at, &end.amplitude, &end.frequency, &end.phase}) {
+      if (!std::ranges::all_of(*numbers, [](double x) { return std::isfinite(x); })) {
+        reject("end: expected finite numbers");
+      }
+    }
   }
 
   void validate(const Drive<Space>& drive) const {

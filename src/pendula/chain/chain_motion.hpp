@@ -82,19 +82,28 @@ class ChainMotion : public ChainForces<SpaceType, LayoutType, N> {
   PENDULA_IN_REGISTERS void tempo(C& pace, C& quickening) const {
     C sum(0.0), growth(0.0);
     rods_.for_each_acceleration(constants_, gravity_, [&](int i, const Point& rates, const Point& accelerations) {
-      const auto &rate = detail::values_of(rates), &acceleration = detail::values_of(accelerations);
-      const C& inverse_square = constants_[i].inverse_square;
-      const C squared = dot(rate, rate) * inverse_square;
-      const C sixth = squared * squared * squared;
-      sum = fma(sixth, squared, sum);
-      growth = fma(sixth, dot(rate, acceleration) * inverse_square, growth);
+      add_to_tempo(i, rates, accelerations, sum, growth);
     });
+    tempo_of(sum, growth, pace, quickening);
+  }
+
+ protected:
+  // What a link adds to the sums of tempo(), and what follows from them.
+  [[gnu::always_inline]] void add_to_tempo(int i, const Point& rates, const Point& accelerations, C& sum,
+                                           C& growth) const {
+    const auto &rate = detail::values_of(rates), &acceleration = detail::values_of(accelerations);
+    const C& inverse_square = constants_[i].inverse_square;
+    const C squared = dot(rate, rate) * inverse_square;
+    const C sixth = squared * squared * squared;
+    sum = fma(sixth, squared, sum);
+    growth = fma(sixth, dot(rate, acceleration) * inverse_square, growth);
+  }
+  void tempo_of(const C& sum, const C& growth, C& pace, C& quickening) const {
     const C root = sqrt(sqrt(sum)), squared = slowest_pace_ + root;
     pace = sqrt(squared);
     quickening = select(sum > C(0.0), growth / (root * root * root * squared), C(0.0));
   }
 
- protected:
   using typename Base::Stage;
   // Stage values of a step, for predictions of later steps.
   struct Past {

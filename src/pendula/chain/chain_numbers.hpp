@@ -37,7 +37,8 @@ PlainChain plain(const Chain<Space, N>& chain, std::span<const PlainChain::Drive
           chain.lengths().data(),
           chain.damping().data(),
           chain.constant_torque().data(),
-          drives};
+          drives,
+          chain.end() ? &*chain.end() : nullptr};
 }
 
 /// The chain that `plain` was made from. It must have N links, unless N is Eigen::Dynamic.
@@ -56,6 +57,7 @@ Chain<Space, N> chain_of(const PlainChain& plain) {
     std::copy_n(from.amplitude, Space::torque_components, drive.amplitude.data());
     parameters.drives.push_back(drive);
   }
+  if (plain.end != nullptr) parameters.end = *plain.end;
   return Chain<Space, N>(std::move(parameters));
 }
 

@@ -14,6 +14,8 @@
 #include <pendula/system/options.hpp>
 #include <pendula/system/outcome.hpp>
 #include <pendula/system/stop_sign.hpp>
+#include <stdexcept>
+#include <utility>
 
 namespace pendula {
 
@@ -40,9 +42,9 @@ class ChainSolver : public StageIterations<ChainStages<SpaceType, S, N, RealType
 
   /// Throws std::invalid_argument unless `stages` is S and the method exists with S stages.
   ChainSolver(const Model& chain, int stages, Iteration iteration = Iteration::automatic, Family family = Family::gauss)
-      : Base(iteration, newton_cost<Space>(S), chain, family),
+      : Base(chain.is_held() ? Iteration::fixed_point : iteration, newton_cost<Space>(S), chain, family),
         family_(family),
-        newton_(iteration == Iteration::fixed_point ? 0 : chain.links()),
+        newton_(iteration == Iteration::fixed_point || chain.is_held() ? 0 : chain.links()),
         turn_(stages, order_of(family, stages)) {
     tableau_of<S>(family, stages);
   }
@@ -70,13 +72,18 @@ class ChainSolver : public StageIterations<ChainStages<SpaceType, S, N, RealType
     return fastest > 0 ? std::min(h, turn_.within(tolerance) / fastest) : h;
   }
   SolverTraits traits() const {
-    return {stages_.links(),          Space::dof * stages_.links(), S, detail::largest_turn, stages_.loaded(),
-            stages_.chain().damped(), family_ == Family::radau};
+    return {stages_.links(),         Space::dof * stages_.links(),       S,
+            detail::largest_turn,    stages_.chain().exchanges_energy(), stages_.chain().damped(),
+            family_ == Family::radau};
   }
   double energy_defect() {
     if (is_by_newton()) newton_.find_multipliers(stages_);
     return stages_.energy_defect();
   }
+
+  /// Constraints that hold the end.
+  int constraints() const { return stages_.chain().is_held() ? Space::dimension : 0; }
+  std::pair<double, double> constraint_errors() const { return stages_.constraint_errors(); }
 
   double accept() {
     const double brought = stages_.brought();
@@ -88,7 +95,12 @@ class ChainSolver : public StageIterations<ChainStages<SpaceType, S, N, RealType
 
   /// linearize() gives the derivative of the step that was solved and not yet accepted.
   using Tangent = ChainTangent<Space, S, N, Real, Arch>;
-  Tangent make_tangent() const { return Tangent(stages_.links()); }
+  Tangent make_tangent() const {
+    if (!stages_.chain().is_held()) return Tangent(stages_.links());
+    throw std::invalid_argument(
+        "chain.end: expected a chain that hangs free: one whose last bob is held has no derivatives yet; the model "
+        "hanging_chain has");
+  }
   void linearize(Tangent& tangent) {
     if (is_by_newton()) newton_.find_multipliers(stages_);
     tangent.linearize(stages_);

@@ -7,8 +7,8 @@
 #include <limits>
 #include <pendula/chain/chain.hpp>
 #include <pendula/chain/chain_links.hpp>
-#include <pendula/chain/chain_turns.hpp>
 #include <pendula/chain/heading.hpp>
+#include <pendula/chain/held_stages.hpp>
 #include <pendula/chain/invariants.hpp>
 #include <pendula/chain/multipliers.hpp>
 #include <pendula/chain/rod_state.hpp>
@@ -26,8 +26,8 @@ namespace pendula {
 /// State and stages of one chain, for both iterations: the fixed point of ChainMotion, and Newton's. All stages of one
 /// number are the lanes of a Lanes<S, Real>.
 template <class Space, int S, int N = Eigen::Dynamic, class RealType = double, class Arch = xsimd::default_arch>
-class ChainStages : public ChainTurns<Space, S, N, RealType> {
-  using Base = ChainTurns<Space, S, N, RealType>;
+class ChainStages : public HeldStages<Space, S, N, RealType> {
+  using Base = HeldStages<Space, S, N, RealType>;
   using Base::anchors_, Base::columns_, Base::constants_, Base::direction, Base::entry, Base::kept_, Base::past,
       Base::prediction_, Base::rate_at, Base::rods_, Base::stages_, Base::turn_;
 
@@ -50,6 +50,7 @@ class ChainStages : public ChainTurns<Space, S, N, RealType> {
     this->slowest_pace_ = slowest_pace_squared<Real>(Real(links()), this->gravity_, length);
     this->fastest_swing_ = given.fastest_swing_squared();
     if (chain.loaded()) this->expect_loads();
+    if (chain.is_held()) this->hold(*chain.end(), family);
   }
 
   const Chain<Space, N>& chain() const { return chain_; }
@@ -139,6 +140,7 @@ class ChainStages : public ChainTurns<Space, S, N, RealType> {
       rods_.start(0, i, Wide(constants_[i].length), Heading<Space, Wide>(angles, rates));
       anchors_[i].set(direction(i), q);
     }
+    this->close_end(state.time);
   }
 
   /// Predicts the stages of a step.
@@ -151,6 +153,7 @@ class ChainStages : public ChainTurns<Space, S, N, RealType> {
     if (loaded() && (is_new || chain_.driven() || !torque_is_set_)) set_torques(task.time);
     Base::predict(h, static_cast<Real>(ratio),
                   {kind.follows, kind.again, kind.cold, Real(kind.depth), Real(kind.known)});
+    this->prepare_end(task.time);
     is_first_ = true;
     is_finished_ = false;
   }
@@ -164,7 +167,7 @@ class ChainStages : public ChainTurns<Space, S, N, RealType> {
   /// link i at the stages).
   template <class Visit>
   double iterate(Visit visit) {
-    const Real changed = Base::iterate(Everyone{}, visit);
+    const Real changed = Base::iterate(visit);
     if (std::exchange(is_first_, false)) this->scale_ = std::max(this->scale_, changed);  // from rest
     is_finished_ = false;
     return changed == 0 ? 0 : std::sqrt(static_cast<double>(changed / this->scale_));
@@ -199,7 +202,7 @@ class ChainStages : public ChainTurns<Space, S, N, RealType> {
     const Energies start = energies();
     const double brought = this->brought();
     trial_ = rods_.place();
-    Base::move(Everyone{});
+    this->move_on();
     const Energies end = energies();
     rods_.place() = trial_;
     return static_cast<double>(end.total() - start.total() - brought) / scale_of(start, brought);
@@ -261,13 +264,16 @@ class ChainStages : public ChainTurns<Space, S, N, RealType> {
   }
 
   /// The work of loads in the step  [J].
-  double brought() const { return loaded() ? static_cast<double>(Base::work()) : 0; }
+  double brought() {
+    return (loaded() ? static_cast<double>(Base::work()) : 0) + static_cast<double>(this->brought_by_end());
+  }
 
   /// Moves the state to the end of the step.
   void accept() {
     if (!is_finished_) finish();
     Base::follow_turns();
-    Base::move(Everyone{});
+    this->move_on();
+    this->note_end();
     prediction_.accept();
     if (prediction_.steps() % restoring_interval_ == 0) rods_.restore_lengths(constants_, Everyone{});
     for (int i = 0; i < links(); ++i) anchors_[i].follow(direction(i));
@@ -276,6 +282,7 @@ class ChainStages : public ChainTurns<Space, S, N, RealType> {
   template <class MemberNumbers>
   void member(MemberNumbers& numbers) {
     numbers(rods_, prediction_, fastest_, this->newest_, this->hangs_, this->scale_);
+    if (this->is_held()) Base::member(numbers);
     for (int i = 0; i < links(); ++i) {
       numbers(anchors_[i]);
       for (auto& step : this->pasts_[i]) {

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <pendula/chain/chain_end.hpp>
 #include <span>
 #include <type_traits>
 
@@ -21,6 +22,7 @@ struct PlainChain {
   const double* damping;  ///< (links)
   const double* torque;   ///< constant torques link by link, (torque components x links)
   std::span<const Drive> drives;
+  const ChainEnd* end = nullptr;  ///< what holds the last bob; null for one that hangs free
 };
 static_assert(std::is_trivially_copyable_v<PlainChain> && std::is_standard_layout_v<PlainChain>);
 

@@ -225,6 +225,53 @@ class RodState : public RodBlocks<Space, N, Num> {
   static Vector vector(const Num* from) {
     return components<D>([&](std::size_t k) { return from[k]; });
   }
+  Vector rod(int i) const { return vector(at_.along[i]); }
+
+  // --- Parts of sweeps ---
+
+  /// ξ_i·z_i with their low parts.
+  Num exact_product_of(int i) const {
+    Vector product, low;
+    for (std::size_t k = 0; k < D; ++k) {
+      const Twofold<Num> exact = exact_product(at_.along[i][k], at_.free[i][k]);
+      product[k] = exact.value;
+      low[k] = exact.low + (at_.along[i][k] * at_.free_low[i][k] + at_.along_low[i][k] * at_.free[i][k]);
+    }
+    return total(product.data(), low.data());
+  }
+
+  /// Eliminates the multipliers, where right(i) is the right-hand side of their equations (multipliers.hpp).
+  template <class Constants, class Right>
+  void eliminate(const Constants& constants, Right right) const {
+    MultiplierRow<Num> row;
+    Num beyond(0.0);
+    for (int i = links(); i-- > 0;) {
+      const Vector rod = vector(at_.along[i]);
+      const Num before =
+          i == 0 ? Num(0.0) : Num(-constants[i - 1].inverse_mass.value * dot(vector(at_.along[i - 1]), rod));
+      rows_[i] = row = row.next(constants[i].inverse_masses * dot(rod, rod), beyond, before, right(i));
+      beyond = before;
+    }
+  }
+
+  /// Calls visit(i, e_i − e_{i−1}, multiplier of rod i) from the pivot out: the changes of rates by multipliers.
+  template <class Constants, class Visit>
+  void for_each_bond(const Constants& constants, Visit visit) const {
+    Num multiplier = rows_[0].offset;
+    Vector before = components<D>([](std::size_t) { return Num(0.0); });
+    for (int i = 0; i < links(); ++i) {
+      const bool last = i + 1 == links();
+      const Num next = last ? Num(0.0) : Num(rows_[i + 1].offset - rows_[i + 1].coupling * multiplier);
+      Vector pull = scaled(multiplier, vector(at_.along[i]));
+      if (!last) pull = difference(pull, scaled(next, vector(at_.along[i + 1])));
+      const Vector bond = scaled(constants[i].inverse_mass.value, pull);
+      visit(i, difference(bond, before), multiplier);
+      before = bond;
+      multiplier = next;
+    }
+  }
+  /// Room for the rate of a rod.
+  Vector& rate_room(int i) const { return rates_[i]; }
 
  private:
   // The gauge change of a block of links, preceded by what the link before the block adds to it.
@@ -326,47 +373,6 @@ class RodState : public RodBlocks<Space, N, Num> {
       low[k] = exact.low;
     }
     return total(product.data(), low.data());
-  }
-
-  Num exact_product_of(int i) const {
-    Vector product, low;
-    for (std::size_t k = 0; k < D; ++k) {
-      const Twofold<Num> exact = exact_product(at_.along[i][k], at_.free[i][k]);
-      product[k] = exact.value;
-      low[k] = exact.low + (at_.along[i][k] * at_.free_low[i][k] + at_.along_low[i][k] * at_.free[i][k]);
-    }
-    return total(product.data(), low.data());
-  }
-
-  // Eliminates the multipliers, where right(i) is the right-hand side of their equations (multipliers.hpp).
-  template <class Constants, class Right>
-  void eliminate(const Constants& constants, Right right) const {
-    MultiplierRow<Num> row;
-    Num beyond(0.0);
-    for (int i = links(); i-- > 0;) {
-      const Vector rod = vector(at_.along[i]);
-      const Num before =
-          i == 0 ? Num(0.0) : Num(-constants[i - 1].inverse_mass.value * dot(vector(at_.along[i - 1]), rod));
-      rows_[i] = row = row.next(constants[i].inverse_masses * dot(rod, rod), beyond, before, right(i));
-      beyond = before;
-    }
-  }
-
-  // Calls visit(i, e_i − e_{i−1}, multiplier of rod i) from the pivot out: the changes of rates by multipliers.
-  template <class Constants, class Visit>
-  void for_each_bond(const Constants& constants, Visit visit) const {
-    Num multiplier = rows_[0].offset;
-    Vector before = components<D>([](std::size_t) { return Num(0.0); });
-    for (int i = 0; i < links(); ++i) {
-      const bool last = i + 1 == links();
-      const Num next = last ? Num(0.0) : Num(rows_[i + 1].offset - rows_[i + 1].coupling * multiplier);
-      Vector pull = scaled(multiplier, vector(at_.along[i]));
-      if (!last) pull = difference(pull, scaled(next, vector(at_.along[i + 1])));
-      const Vector bond = scaled(constants[i].inverse_mass.value, pull);
-      visit(i, difference(bond, before), multiplier);
-      before = bond;
-      multiplier = next;
-    }
   }
 
   FullState at_;

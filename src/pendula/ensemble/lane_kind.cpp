@@ -20,7 +20,7 @@ bool has_lanes(const RunOptions& options, bool with_tangents) {
 template <class Space>
 bool name_chain(const RunSetup& setup, const RunOptions& options, bool with_tangents, LaneKind& kind) {
   const auto* const chain = dynamic_cast<const ChainSubject<Space>*>(setup.subject.get());
-  if (chain == nullptr || !has_lanes<Space>(options, with_tangents)) return false;
+  if (chain == nullptr || chain->chain().is_held() || !has_lanes<Space>(options, with_tangents)) return false;
   kind.dimension = Space::dimension;
   kind.links = chain->chain().links();
   if (options.method == Method::taylor) {

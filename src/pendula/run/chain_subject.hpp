@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <pendula/chain/chain.hpp>
+#include <pendula/chain/end_force.hpp>
 #include <pendula/chain/invariants.hpp>
 #include <pendula/numeric/number_text.hpp>
 #include <pendula/run/subject.hpp>
@@ -24,11 +25,11 @@ class ChainSubject : public Subject {
 
   Observation observe(const Motion& motion) const override {
     const Energies<double> found = energies(chain_, motion);
-    return {bob_positions(chain_, motion).reshaped(), found.kinetic, found.total()};
+    return {bob_positions(chain_, motion).reshaped(), found.kinetic, found.total(), end_force(chain_, motion)};
   }
 
   std::optional<double> energy_scale() const override { return pendula::energy_scale(chain_); }
-  bool loaded() const override { return chain_.loaded(); }
+  bool loaded() const override { return chain_.exchanges_energy(); }
   bool damped() const override { return chain_.damped(); }
 
   /// Warns of damping too strong for Gauss steps to follow: Gauss methods are A-stable, but not L-stable. The decay
@@ -68,7 +69,13 @@ class ChainSubject : public Subject {
       quantities.push_back({std::string(axis), "m", Role::point, std::string(axis).append(" of the bob"), first++,
                             links, Space::dimension});
     }
-    const std::size_t last = 1 + (2 * Space::dof + Space::dimension) * links;
+    std::size_t last = 1 + (2 * Space::dof + Space::dimension) * links;
+    if (chain_.is_held()) {
+      for (const std::string_view axis : axes()) {
+        quantities.push_back({"force_end_" + std::string(axis), "N", Role::force,
+                              std::string(axis) + " of the force that holds the last bob", last++});
+      }
+    }
     quantities.push_back({"energy", "J", Role::energy, "energy T + U", last});
     return quantities;
   }
@@ -96,6 +103,7 @@ class ChainSubject : public Subject {
     parameters.torque.resize(Space::torque_components, chain_.links());
     std::ranges::copy(inputs, parameters.torque.data());
     parameters.drives = chain_.drives();
+    parameters.end = chain_.end();
     for (const InputSine& sine : added) {
       Drive<Space> drive;
       drive.link = sine.input / Space::torque_components;
@@ -116,6 +124,7 @@ class ChainSubject : public Subject {
       for (int a = 0; a < Space::dof; ++a) row.push_back(motion.v[a * links + link]);
     }
     row.insert(row.end(), seen.points.begin(), seen.points.end());
+    row.insert(row.end(), seen.forces.begin(), seen.forces.end());
     row.push_back(seen.energy);
   }
 

@@ -111,6 +111,7 @@ void find_accelerations(const SystemSubject& subject, const Motion& motion, doub
 
 template <class Space>
 void find_accelerations(const ChainSubject<Space>& subject, const Motion& motion, double* found) {
+  if (subject.chain().is_held()) throw std::invalid_argument(held_end_is_not_here);
   ChainForwardDynamics<Space>(subject.chain()).acceleration(motion.time, motion.q.data(), motion.v.data(), found);
 }
 

@@ -31,6 +31,7 @@ std::string against_series(const Subject& subject, double tolerance) {
   if (dynamic_cast<const ChainSubject<Spatial>*>(&subject) != nullptr) return "a chain in space";
   const auto* const chain = dynamic_cast<const ChainSubject<Planar>*>(&subject);
   if (chain == nullptr) return "inputs that change from step to step";
+  if (chain->chain().is_held()) return "an end that is held";
   const int links = chain->chain().links();
   if (links > (tolerance < fine_tolerance ? always_few : few)) return "many links";
   return series_kernel<Planar>(links, true, false) == nullptr ? "no kernel for the number of links" : "";

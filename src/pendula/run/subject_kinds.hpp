@@ -21,6 +21,10 @@ inline constexpr const char* sampled_has_no_derivatives =
 inline constexpr const char* signals_are_not_here =
     "signal: expected a system without signals, got one with: here a program holds inputs itself, from step to step";
 
+inline constexpr const char* held_end_is_not_here =
+    "chain.end: expected a chain that hangs free, got one whose last bob is held: for its linearization take the model "
+    "hanging_chain";
+
 /// Calls act(subject) with what a subject is: a SystemSubject or a ChainSubject. Throws std::invalid_argument for one
 /// with sampled feedback or signals.
 template <class Act>
@@ -42,6 +46,7 @@ auto as_its_kind_at(const Subject& subject, double time, Act act) {
 template <class Space>
 SystemModel system_model_of(const ChainSubject<Space>& subject) {
   const Chain<Space>& chain = subject.chain();
+  if (chain.is_held()) throw std::invalid_argument(held_end_is_not_here);
   for (const SystemTable* kernel : library<KernelList<Space>>().tables) {
     if (kernel->info.links != chain.links()) continue;
     const std::vector<PlainChain::Drive> drives = plain_drives(chain);
