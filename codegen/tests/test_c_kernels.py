@@ -209,6 +209,8 @@ class Truth:
                     "g_dot": said("constraint_rates", at),
                     "g_ddot": said("constraint_second_rates", at),
                 }
+            case "constraint_rate_slopes":
+                return {"g_dot_D_q": said("constraint_rates_q", at)}
             case "constraints_along" | "constraint_rates_along":
                 slope = self._slope(function.removesuffix("_along"), at, {"parameters": "d_parameters"})
                 if function == "constraints_along":

@@ -112,8 +112,8 @@ def test_what_is_wrong_is_told(pendula, tmp_path, arguments, expected):
 def test_a_linkage(pendula):
     lines = pendula("describe", "four_bar").stdout.splitlines()
     for line in [
-        "constraint  unit",
-        "loop_x      m",
-        "degrees of freedom: 1, if no constraint follows from others",
+        "constraint  unit  of",
+        "loop_x      m     positions",
+        "degrees of freedom: 1 of rates, if no constraint follows from others",
     ]:
         assert line in lines
