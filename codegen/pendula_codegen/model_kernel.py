@@ -5,7 +5,23 @@ from __future__ import annotations
 from collections.abc import Iterator, Set
 from functools import cached_property
 
-from sympy import Abs, Add, Expr, Function, Integer, Matrix, Mul, Pow, Rational, acos, asin, cos, log, sin, tan
+from sympy import (
+    Abs,
+    Add,
+    Expr,
+    Function,
+    Integer,
+    Matrix,
+    Mul,
+    Pow,
+    Rational,
+    acos,
+    asin,
+    cos,
+    log,
+    sin,
+    tan,
+)
 
 from pendula_codegen.entry_points import Declared, Output, Q, SystemKernel, V
 from pendula_codegen.entry_points import Function as EntryPoint
@@ -73,7 +89,9 @@ class ModelKernel(SystemKernel):
             return Output(name, "constraints", Matrix(value), f"{meaning}, ({count})")
 
         def matrix(name: str, value: Matrix, meaning: str) -> Output:
-            return Output(name, "constraint_slopes", value, f"{meaning}, ({count} x {len(system.coordinates)})")
+            return Output(
+                name, "constraint_slopes", value, f"{meaning}, ({count} x {len(system.coordinates)})"
+            )
 
         of_rates = any(constraint.of_rates for constraint in given)
         more = "; of those of rates g is 0, and A v + b = 0 stands for dg/dt" if of_rates else ""

@@ -53,6 +53,7 @@ def define(model, links):
     model.point("r", (x + sin(theta), y, cos(theta) * t))
     model.constraint("tied", x**2 + a * sqrt(2 + y**2) - sin(theta + t), "m^2")
     model.constraint("turned", theta * t - b * y, "rad")
+    model.constraint("rolled", y * model.rate(x) - sin(a * x + t) * model.rate(theta) + b * x * cos(y), "m^2/s")
 """
 # Functions of several pieces, one in another, and one whose pieces have no values elsewhere.
 PIECES = """

@@ -281,7 +281,8 @@ class StageConstraints {
     start_.stop(here_, q, v, first_.data());
     for (std::size_t i = 0; i < count_; ++i) {
       double speed = at_rest * size(i, q);
-      for (std::size_t k = 0; k < coordinates_; ++k) speed += std::abs(start_.slope(i, k) * v[k]);
+      const double fastest = is_of_rates(i) ? at_rest * fastest_of(v) : 0;
+      for (std::size_t k = 0; k < coordinates_; ++k) speed += std::abs(start_.slope(i, k)) * (std::abs(v[k]) + fastest);
       require(i, "0", start_.value(i), size(i, q));
       require(i, "a rate of 0", start_.rate(i), speed);
     }
@@ -300,6 +301,12 @@ class StageConstraints {
   }
   static double end(const Compensated<double>& start, const double* increments, double more) {
     return start.value + (start.compensation + (total(increments) + more));
+  }
+
+  double fastest_of(const double* v) const {
+    double most = 0;
+    for (std::size_t k = 0; k < coordinates_; ++k) most = std::max(most, std::abs(v[k]));
+    return most;
   }
 
   bool is_of_rates(std::size_t i) const { return of_rates_ && at_nodes_.model().info().constraint_is_of_rates[i]; }
