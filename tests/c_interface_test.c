@@ -93,7 +93,7 @@ static void a_chain(void) {
   pendula_motion(copy, copied, copied + 2);
   expect(memcmp(end, copied, sizeof end) == 0, "resumed to the bit");
   expect(pendula_at(run, 2.5, half, half + 2) == PENDULA_OK && half[0] != end[0], "half way");
-  expect(pendula_row(chain, 5, end, end + 2, row) == PENDULA_OK && row[0] == 5 && row[1] == end[0], "a row");
+  expect(pendula_row(chain, 5, end, end + 2, NULL, row) == PENDULA_OK && row[0] == 5 && row[1] == end[0], "a row");
   expect(pendula_linearize(run, a, NULL) == PENDULA_OK && a[2] == 1 && a[0] == 0, "its derivative");
   expect(pendula_finish(run) == PENDULA_OK, "the end");
   pendula_simulation_free(copy);

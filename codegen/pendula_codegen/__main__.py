@@ -26,6 +26,7 @@ from pendula_codegen.export import (
     Values,
     render_export,
     require_free,
+    require_free_rates,
     require_size,
 )
 from pendula_codegen.feedback import SampledLaw, close_loops, sampled_laws, sampled_laws_of_chain
@@ -261,7 +262,9 @@ def _exported_chain(options: argparse.Namespace) -> Mapping[str, str | bytes]:
 
 def _exported_model(options: argparse.Namespace) -> Mapping[str, str | bytes]:
     model = _fed_model(options)
-    require_free(model.constraints)
+    require_free_rates(model.constraints)
+    if options.language != "fmu":
+        require_free(model.constraints)
     wanted = _request(options, sampled_laws(model, options.sampled))
     command = f"--model {Path(options.model).name}{links_argument(model)} {_export_words(options)} --output ."
     kernel, file = ModelKernel(model), Path(model.file)
@@ -287,8 +290,8 @@ def _fmu(
         raise GenerationError("export: expected --library and --headers with fmu, got none")
     request.check()
     runtime = Runtime(options.library, options.headers, options.flag, options.tolerance, **moved)
-    is_small = len(declared.coordinates) <= MOST_COORDINATES
-    texts = equations(replace(request, name=EQUATIONS)) if is_small else {}
+    is_written_out = len(declared.coordinates) <= MOST_COORDINATES and not declared.forces
+    texts = equations(replace(request, name=EQUATIONS)) if is_written_out else {}
     return {f"{options.name}.fmu": packed_fmu(declared, request, runtime, texts)}
 
 

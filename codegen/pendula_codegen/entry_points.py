@@ -121,7 +121,8 @@ class Function:
 
 @dataclass(frozen=True)
 class Declared:
-    """What a system has: `points` by name and number of components; `switches` that decide between pieces, as text.
+    """What a system has: `points` by name and number of components; `switches` that decide between pieces, as text;
+    `forces` of constraints by name and unit.
 
     The last parameters are two indicators for each switch.
     """
@@ -131,6 +132,7 @@ class Declared:
     inputs: list[Input]
     points: list[tuple[str, int]]
     switches: Sequence[str] = ()
+    forces: Sequence[tuple[str, str]] = ()
 
 
 V, Q, P, A = (Argument(name, "vector") for name in "vqpa")

@@ -314,12 +314,23 @@ def _require_smooth(switches: Sequence[str]) -> None:
         )
 
 
+def require_free_rates(constraints: Sequence[Constraint]) -> None:
+    """Raises GenerationError for constraints of rates."""
+    names = ", ".join(each.name for each in constraints if each.of_rates)
+    if names:
+        raise GenerationError(
+            f"export: expected a model without constraints of rates, got one with {names}: what is exported cannot "
+            "keep them yet"
+        )
+
+
 def require_free(constraints: Sequence[Constraint]) -> None:
     """Raises GenerationError where there are some."""
     if constraints:
         names = ", ".join(each.name for each in constraints)
         raise GenerationError(
-            f"export: expected a model without constraints, got one with {names}: what is exported cannot keep them yet"
+            f"export: expected a model without constraints, got one with {names}: C and CasADi cannot keep them yet; "
+            "an FMU can (--as fmu)"
         )
 
 

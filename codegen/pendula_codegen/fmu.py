@@ -114,6 +114,8 @@ def _rows(
     for name, count in declared.points:
         for axis in "xyz"[:count]:
             yield f"{name}_{axis}", "output", f'{output} initial="calculated"', "m", ""
+    for name, unit in declared.forces:
+        yield name, "output", f'{output} initial="calculated"', unit, ""
     yield "energy", "output", f'{output} initial="calculated"', "J", ""
     for k, switch in enumerate(switches, start=1):
         said = f' description="{escape(switch)}, whose zeros are events"'
@@ -127,7 +129,8 @@ def _start(value: float | None) -> str:
 def packed_fmu(declared: Declared, request: Request, runtime: Runtime, equations: Mapping[str, str]) -> bytes:
     """The archive, with the binary for this machine.
 
-    `equations` are the files of render_export for the name EQUATIONS; empty if there are too many coordinates.
+    `equations` are the files of render_export for the name EQUATIONS; empty if there are too many coordinates, or
+    constraints, which an importer's integrator would leave.
     Raises GenerationError without a compiler.
     """
     texts = _rendered(declared, request, runtime, has_equations=bool(equations))
@@ -162,7 +165,8 @@ def _rendered(declared: Declared, request: Request, runtime: Runtime, has_equati
         "states": 2 * n,
         "parameters": len(values["parameters"]),
         "inputs": len(declared.inputs),
-        "points": sum(count for _, count in declared.points),
+        "points": sum(count for _, count in declared.points) + len(declared.forces),
+        "constraints": len(declared.forces),
         "values": values,
         "time": request.values.time,
         "step": request.values.step or DEFAULT_STEP,
@@ -170,7 +174,7 @@ def _rendered(declared: Declared, request: Request, runtime: Runtime, has_equati
         "tolerance": runtime.tolerance,
         "switches": switches,
         "equations": has_equations,
-        "exchanges": has_equations or not declared.switches,
+        "exchanges": has_equations or not (declared.switches or declared.forces),
         "chain": runtime.chain,
         "drives": runtime.drives,
         "variables": variables,

@@ -49,7 +49,8 @@ class ModelKernel(SystemKernel):
         model = self.model
         points = [(point.name, len(point.components)) for point in model.points]
         switches = [switch.text for switch in model.switches]
-        return Declared(model.coordinates, model.ordered_parameters, model.inputs, points, switches)
+        forces = [(f"force_{each.name}", f"J/({each.unit})") for each in model.constraints]
+        return Declared(model.coordinates, model.ordered_parameters, model.inputs, points, switches, forces)
 
     @cached_property
     def points(self) -> tuple[Matrix | None, Matrix | None]:

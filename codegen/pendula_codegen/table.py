@@ -99,7 +99,7 @@ class _Tables:
                 "constraints", ("parameters",), ("dg", "d_g_D_q")
             )
             composed["constraint_rates_along"] = lambda: self._slopes(
-                "constraint_rates", ("parameters",), ("d_g_dot",)
+                "constraint_rates", ("parameters", "q", "v"), ("d_g_dot", "d_g_ddot")
             )
         # The factors of larger matrices, which series keep, have no derivative here.
         if len(self._kernel.system.coordinates) <= UNROLLED:

@@ -213,10 +213,13 @@ class Truth:
             case "constraint_rate_slopes":
                 return {"g_dot_D_q": said("constraint_rates_q", at)}
             case "constraints_along" | "constraint_rates_along":
-                slope = self._slope(function.removesuffix("_along"), at, {"parameters": "d_parameters"})
+                moved = {"parameters": "d_parameters"}
+                if function == "constraint_rates_along":
+                    moved |= {"q": "dq", "v": "dv"}
+                slope = self._slope(function.removesuffix("_along"), at, moved)
                 if function == "constraints_along":
                     return {"dg": slope["g"], "d_g_D_q": slope["g_D_q"]}
-                return {"d_g_dot": slope["g_dot"]}
+                return {"d_g_dot": slope["g_dot"], "d_g_ddot": slope["g_ddot"]}
             case "switches":
                 return {"g": self._values("switches", [s.value for s in self.model.switches], at)}
             case "positions":
@@ -430,8 +433,9 @@ def test_what_a_kernel_says_of_itself(everything):
         "point\tp\t2\tbob",
         "point\tr\t3\tbob",
         *(line for line in lines if line.startswith("argument\t")),
-        "constraint\ttied\tm^2",
-        "constraint\tturned\trad",
+        "constraint\ttied\tm^2\t0",
+        "constraint\tturned\trad\t0",
+        "constraint\trolled\tm^2/s\t1",
         f"series\t1\t61\t77\t{loaded.table.series.kept}",
         *(f"sum\t{first}\t{second}" for first, second in loaded.table.series.series.places),
     ]

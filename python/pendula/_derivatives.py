@@ -204,7 +204,9 @@ def linearize(
     moved = differentiate(system, length, start={**system.at_zero(), **given}, tolerance=tolerance)
     by_inputs = [moved.by_inputs[name][0] for name in moved.by_inputs]
     b = np.hstack([np.empty((moved.y.shape[0], 0)), *by_inputs])
-    return LinearSystem(moved.by_start[0], b, step=length, **simulation._seen(outputs))
+    told = simulation._seen(outputs)
+    rows = [*map(state_names(simulation._made).index, told["names"])]
+    return LinearSystem(moved.by_start[0][rows] @ told["basis"], b[rows], step=length, **told)
 
 
 def _times(duration: object, t: ArrayLike | None, made: _core.Prepared) -> NDArray[np.float64]:

@@ -26,12 +26,16 @@ class LinearSystem(tuple["NDArray[np.float64]", "NDArray[np.float64]"]):
     ----------
     C, D : numpy.ndarray
         Derivatives of outputs with respect to the state and to inputs: a row for each output.
+    basis : numpy.ndarray
+        (2n, 2d): deviations of all n coordinates and their rates from those of x, which are d coordinates, and their
+        rates, from which the others follow by constraints. The identity without constraints.
     names, inputs, outputs : list of str
         Names of the numbers in x, u and y.
     step : float or None
         In s.
     """
 
+    basis: NDArray[np.float64]
     C: NDArray[np.float64]
     D: NDArray[np.float64]
     names: list[str]
@@ -46,12 +50,12 @@ class LinearSystem(tuple["NDArray[np.float64]", "NDArray[np.float64]"]):
 
     @property
     def A(self) -> NDArray[np.float64]:
-        """(2n, 2n)"""
+        """(2d, 2d)"""
         return self[0]
 
     @property
     def B(self) -> NDArray[np.float64]:
-        """(2n, inputs)"""
+        """(2d, inputs)"""
         return self[1]
 
     @property
@@ -92,14 +96,20 @@ def _again(a: NDArray[np.float64], b: NDArray[np.float64], told: Mapping[str, An
     return LinearSystem(a, b, **told)
 
 
+def rows_of(coordinates: Sequence[int], rows: int) -> list[int]:
+    """The rows of these coordinates and of their rates among those of all."""
+    return [*coordinates, *(rows // 2 + k for k in coordinates)]
+
+
 def seen(
     made: _core.Prepared,
     outputs: Outputs | None,
     time: float,
     state: NDArray[np.float64],
     held: Sequence[float],
+    independent: tuple[Sequence[int], NDArray[np.float64]],
 ) -> dict[str, Any]:
-    """C and D of the measured quantities, and the names of all numbers. Raises InputError."""
+    """C and D of the measured quantities, the basis, and the names of all numbers. Raises InputError."""
     if isinstance(outputs, str) or not isinstance(outputs, (Mapping, Sequence, type(None))):
         raise InputError(f"outputs: expected columns or expressions, got {outputs!r}")
     if outputs is None:
@@ -110,10 +120,13 @@ def seen(
             raise InputError(f"outputs: expected columns or expressions, got {text!r}")
     with plainly():
         c, d = _core.output_slopes(made, list(texts.values()), time, state, list(held))
+    coordinates, basis = independent
+    names = state_names(made)
     return {
-        "C": c,
+        "C": c @ basis,
         "D": d,
-        "names": state_names(made),
+        "basis": basis,
+        "names": [names[row] for row in rows_of(coordinates, len(names))],
         "inputs": made.inputs,
         "outputs": list(texts),
     }

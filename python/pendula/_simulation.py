@@ -361,8 +361,8 @@ class Simulation:
         ]
 
     def linearize(self, outputs: Outputs | None = None) -> LinearSystem:
-        """The exact linearisation d(q, v)/dt = A (q, v) + B inputs at the present state; ``outputs`` are those of
-        :func:`linearize`.
+        """The exact linearisation dx/dt = A x + B inputs at the present state, x = (q, v); with constraints of those
+        coordinates from which the others follow. ``outputs`` are those of :func:`linearize`.
 
         Raises InputError if the equations are singular, as in space at a pole, where phi is undefined; and
         RuntimeError for a chain of more links than this build has kernels for.
@@ -378,7 +378,10 @@ class Simulation:
 
     def _seen(self, outputs: Outputs | None) -> dict[str, Any]:
         """C and D at the present state, and the names of all numbers of a linear system."""
-        return seen(self._made, outputs, self.time, self.state, list(self.inputs.values()))
+        with self._alone():
+            independent = self._core.independent()
+        held = list(self.inputs.values())
+        return seen(self._made, outputs, self.time, self.state, held, independent)
 
     def copy(self) -> Simulation:
         """A simulation that goes on as this one does, to the last bit."""

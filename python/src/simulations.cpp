@@ -88,10 +88,13 @@ void define_simulations(nb::module_& module) {
       .def_prop_ro("held", &Mover::inputs)
       .def("linearize",
            [](const Mover& self) {
-             const auto n = static_cast<std::size_t>(2 * self.motion().q.size()), inputs = self.inputs().size();
-             std::vector<double> a(n * n), b(n * inputs);
-             linearize(self.subject(), self.motion(), a.data(), b.data());
-             return std::pair(owned<Array>(std::move(a), {n, n}), owned<Array>(std::move(b), {n, inputs}));
+             const Linearized found = linearize(self.subject(), self.motion());
+             return std::pair(array_of(found.a), array_of(found.b));
+           })
+      .def("independent",
+           [](const Mover& self) {
+             const Independent found = find_independent(self.subject(), self.motion());
+             return std::pair(found.coordinates, array_of(found.basis));
            })
       .def("save", [](Mover& self) { return vector_of(self.save().numbers); })
       .def("resume", [](Mover& self, const Numbers& saved) {

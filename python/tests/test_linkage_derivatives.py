@@ -147,3 +147,71 @@ def test_exponents_are_those_of_the_freedoms() -> None:
     assert abs(swings.sum) < 1e-3  # measured 3.4e-5
     with pytest.raises(ValueError, match="expected 1 to 2 exponents, got 3"):
         pendula.lyapunov(rod(), 1.0, start=cartesian(1.0, 0.0), step=0.05, count=3)
+
+
+@pendula.model
+def hung_bar(model, links):
+    """A bar on two threads of rods in the plane, as wide as their hooks are apart, with a rod too many."""
+    from sympy import cos, sin
+
+    g, mass = 9.81, model.parameter("m", "kg", default=2.0)
+    x, y, turn = model.coordinate("x", "m"), model.coordinate("y", "m"), model.coordinate("turn", "rad")
+    push = model.input("push", "N")
+    speed_squared = model.rate(x) ** 2 + model.rate(y) ** 2
+    model.lagrangian = mass * (speed_squared + model.rate(turn) ** 2 / 12) / 2 - mass * g * y
+    model.force(x, push)
+    for k in (-1, 0, 1):
+        across, up = x + k * (cos(turn) - 1) / 2, y + k * sin(turn) / 2
+        model.constraint(f"thread_{k + 2}", (across**2 + up**2 - 1) / 2, "m^2")
+
+
+def accelerations(simulation: pendula.Simulation) -> Numbers:
+    field = pendula._core.field(simulation._made, simulation.time, simulation.state)
+    return np.array(field[len(field) // 2 :])
+
+
+@pytest.mark.parametrize("place", range(6))
+def test_linear_systems_are_those_of_independent_coordinates(place: int) -> None:
+    """Against differences of accelerations, where everything else is put together anew."""
+    theta, rate = np.random.default_rng(place).uniform((0.2, -2), (1.3, 2))
+
+    def begin(torque: float = 0.0, **start: float) -> pendula.Simulation:
+        given = {**GUESSES, "theta_1": theta, "theta_dot_1": rate, **start}
+        return pendula.Simulation(four_bar(inputs={"torque": torque}), {**given, "assemble": FOUND})
+
+    linear = begin().linearize()
+    assert linear.names == ["theta_1", "theta_dot_1"] and linear.inputs == ["torque"]
+    for column, name in enumerate(linear.names):
+        at = {"theta_1": theta, "theta_dot_1": rate}[name]
+        moved = difference(lambda h, name=name, at=at: accelerations(begin(**{name: at + h}))[0])
+        # Measured off by up to 3.9e-10 of numbers up to 79.
+        assert np.allclose(linear.A[:, column], [name != "theta_1", moved], rtol=0, atol=1e-8)
+        basis = difference(lambda h, name=name, at=at: begin(**{name: at + h}).state)
+        assert np.allclose(linear.basis[:, column], basis, rtol=0, atol=1e-8)  # measured up to 7.5e-12
+    pushed = difference(lambda h: accelerations(begin(torque=h))[0], 0.1)
+    assert np.allclose(linear.B[:, 0], [0, pushed], rtol=0, atol=1e-12)  # measured up to 1.1e-14
+
+
+def test_linear_systems_do_not_mind_constraints_too_many() -> None:
+    """A bar on three threads of 1 m moves on a circle, as a pendulum does."""
+    hung = pendula.Simulation(hung_bar(), {"y": -1.0}).linearize({"right": "x", "turn": "turn"})
+    assert hung.names == ["x", "x_dot"]
+    # Here and below measured off by up to 1.8e-15.
+    assert np.allclose(hung.A, [[0, 1], [-9.81, 0]], rtol=0, atol=1e-13)
+    assert np.allclose(hung.B[:, 0], [0, 0.5], rtol=0, atol=1e-14)
+    assert np.allclose(hung.C, [[1, 0], [0, 0]], rtol=0, atol=1e-14)
+    turned = pendula.Simulation(hung_bar(), {"x": 0.6, "y": -0.8, "x_dot": 0.8, "y_dot": 0.6}).linearize()
+    theta = np.arcsin(0.6)  # x = sin(theta), so d(x_dot)/dt = -g sin cos - sin theta_dot^2, theta_dot = 1
+    by_angle = [-9.81 * np.cos(2 * theta) - np.cos(theta), -2 * np.sin(theta)]  # theta, theta_dot
+    by_x = np.array([[1 / 0.8, 0], [0.6 / 0.8**2, 1 / 0.8]])  # (theta, theta_dot) by (x, x_dot)
+    assert np.allclose(turned.A[1], by_angle @ by_x, rtol=0, atol=1e-12)
+
+
+def test_a_step_of_a_linear_system_is_its_exponential() -> None:
+    from scipy.linalg import expm
+
+    start = {"x": 0.0, "y": -1.0}
+    continuous = pendula.linearize(hung_bar(), start)
+    discrete = pendula.linearize(hung_bar(), start, step=0.1, tolerance=1e-12)
+    assert np.allclose(discrete.A, expm(0.1 * continuous.A), rtol=0, atol=1e-12)  # measured 4.4e-16
+    assert discrete.names == continuous.names

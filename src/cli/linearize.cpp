@@ -30,11 +30,12 @@
 namespace pendula::cli {
 namespace {
 
-/// The linearisation at a motion, with names of its numbers.
+/// The linearisation at a motion, with names of its numbers: of all coordinates and rates, and of those in x.
 struct Linear {
   Motion at;
-  std::vector<std::string> names, inputs, outputs;
-  Directions<> a, b, c, d;
+  std::vector<std::string> all, names, inputs, outputs;
+  Linearized system;
+  Directions<> c, d;
   std::optional<double> step;  ///< of the discrete system  [s]; nullopt: continuous
 };
 
@@ -59,11 +60,13 @@ std::vector<std::string> state_names(const Subject& subject) {
 /// Makes the system discrete: from one time to the next, while inputs are held.
 void make_discrete(const Subject& subject, const RunOptions& options, double step, const InterruptGuard& guard,
                    Linear& linear) {
-  const Eigen::Index n = linear.a.rows(), inputs = linear.b.cols();
+  const Directions<>& basis = linear.system.independent.basis;
+  const Eigen::Index n = basis.cols(), inputs = std::ssize(linear.inputs);
   Eigen::Index varied = 0;
   for (const Varied& one : varied_by(subject)) varied += one.size;
-  Directions<> of_start = Directions<>::Zero(n, n + inputs), of_parameters = Directions<>::Zero(varied, n + inputs);
-  of_start.leftCols(n).setIdentity();
+  Directions<> of_start = Directions<>::Zero(basis.rows(), n + inputs),
+               of_parameters = Directions<>::Zero(varied, n + inputs);
+  of_start.leftCols(n) = basis;
   of_parameters.bottomRightCorner(inputs, inputs).setIdentity();  // inputs come last
   const std::array<double, 1> times = {linear.at.time + step};
   const Forward moved = move_variations({.subject = subject,
@@ -73,8 +76,9 @@ void make_discrete(const Subject& subject, const RunOptions& options, double ste
                                          .stop = [&] { return guard.interrupted(); }},
                                         of_start, of_parameters);
   if (!moved.outcome) throw io::InputError(message(moved.outcome, subject.coordinates(), subject.switches()));
-  linear.a = moved.variations.front().leftCols(n);
-  linear.b = moved.variations.front().rightCols(inputs);
+  const Directions<> end = linear.system.independent.rows(moved.variations.front());
+  linear.system.a = end.leftCols(n);
+  linear.system.b = end.rightCols(inputs);
 }
 
 template <class Scenario>
@@ -82,29 +86,31 @@ Linear linear_of(const Scenario& scenario, const LinearizeOptions& options, cons
   const std::shared_ptr<const Subject> subject = io::subject_of(scenario);
   const Motion start = scenario.start;
   Linear linear{.at = options.at == "equilibrium" ? equilibrium(*subject, start) : start,
-                .names = state_names(*subject),
+                .all = state_names(*subject),
+                .names = {},
                 .inputs = input_names(*subject),
                 .outputs = io::point_columns(*subject),
-                .a = {},
-                .b = {},
+                .system = {},
                 .c = {},
                 .d = {},
                 .step = {}};
-  const Eigen::Index n = 2 * linear.at.q.size();
-  linear.a.resize(n, n);
-  linear.b.resize(n, static_cast<Eigen::Index>(linear.inputs.size()));
   if (!options.step.empty()) {
     linear.step = io::number_or_quantity(options.step, "s", {.time = scenario.natural ? scenario.natural->time : 1});
+    linear.system.independent = find_independent(*subject, linear.at);
     make_discrete(*subject, scenario.options, *linear.step, guard, linear);
   } else {
-    linearize(*subject, linear.at, linear.a.data(), linear.b.data());
+    linear.system = linearize(*subject, linear.at);
   }
-  if (!linear.a.allFinite() || !linear.b.allFinite()) {
+  if (!linear.system.a.allFinite() || !linear.system.b.allFinite()) {
     throw io::InputError(options.scenario +
                          ": expected a state where the equations are regular, got one where they are not");
   }
+  const std::vector<std::size_t>& independent = linear.system.independent.coordinates;
+  for (const std::size_t half : {std::size_t{0}, linear.all.size() / 2}) {
+    for (const std::size_t k : independent) linear.names.push_back(linear.all[half + k]);
+  }
   const io::RowSlopes slopes = io::row_slopes(*subject, linear.at, linear.outputs);
-  linear.c = slopes.by_state;
+  linear.c = slopes.by_state * linear.system.independent.basis;
   linear.d = slopes.by_inputs;
   return linear;
 }
@@ -115,6 +121,14 @@ std::vector<double> state_of(const Motion& motion) {
   return state;
 }
 
+// Of x.
+std::vector<double> state_of(const Linear& linear) {
+  const std::vector<double> all = state_of(linear.at);
+  const Directions<> found =
+      linear.system.independent.rows(Eigen::VectorXd::Map(all.data(), static_cast<Eigen::Index>(all.size())));
+  return {found.data(), found.data() + found.size()};
+}
+
 std::vector<std::vector<double>> rows_of(const Directions<>& matrix) {
   std::vector<std::vector<double>> rows;
   for (const auto& row : matrix.rowwise()) rows.emplace_back(row.begin(), row.end());
@@ -122,11 +136,23 @@ std::vector<std::vector<double>> rows_of(const Directions<>& matrix) {
 }
 
 void print_json(const Linear& linear, const LinearizeOptions& options, const Eigen::VectorXcd& eigenvalues) {
-  nlohmann::ordered_json json{{"scenario", options.scenario}, {"at", options.at},       {"step", nullptr},
-                              {"t", linear.at.time},          {"names", linear.names},  {"inputs", linear.inputs},
-                              {"state", state_of(linear.at)}, {"A", rows_of(linear.a)}, {"B", rows_of(linear.b)},
-                              {"outputs", linear.outputs},    {"C", rows_of(linear.c)}, {"D", rows_of(linear.d)}};
+  nlohmann::ordered_json json{{"scenario", options.scenario},
+                              {"at", options.at},
+                              {"step", nullptr},
+                              {"t", linear.at.time},
+                              {"names", linear.names},
+                              {"inputs", linear.inputs},
+                              {"state", state_of(linear)},
+                              {"A", rows_of(linear.system.a)},
+                              {"B", rows_of(linear.system.b)},
+                              {"outputs", linear.outputs},
+                              {"C", rows_of(linear.c)},
+                              {"D", rows_of(linear.d)}};
   if (linear.step) json["step"] = *linear.step;
+  if (linear.all != linear.names) {
+    json["basis"] = {
+        {"names", linear.all}, {"state", state_of(linear.at)}, {"T", rows_of(linear.system.independent.basis)}};
+  }
   for (const std::complex<double>& one : eigenvalues) {
     const Swing swing = swing_of(one, linear.step);
     json["eigenvalues"].push_back({one.real(), one.imag()});
@@ -157,13 +183,18 @@ void print_text(const Linear& linear, const Eigen::VectorXcd& eigenvalues) {
             << ", x a deviation from\n\n";
   const std::vector<double> state = state_of(linear.at);
   for (std::size_t k = 0; k < state.size(); ++k) {
-    std::cout << "  " << std::left << std::setw(17) << linear.names[k] << shortest(state[k]) << '\n';
+    std::cout << "  " << std::left << std::setw(17) << linear.all[k] << shortest(state[k]) << '\n';
   }
-  std::cout << std::right << "\nA\n";
-  print_matrix(linear.a, linear.names, linear.names);
-  if (linear.b.cols() > 0) {
+  std::cout << std::right;
+  if (linear.all != linear.names) {
+    std::cout << "\nT, of their deviations T x: the constraints leave x free\n";
+    print_matrix(linear.system.independent.basis, linear.all, linear.names);
+  }
+  std::cout << "\nA\n";
+  print_matrix(linear.system.a, linear.names, linear.names);
+  if (linear.system.b.cols() > 0) {
     std::cout << "\nB\n";
-    print_matrix(linear.b, linear.names, linear.inputs);
+    print_matrix(linear.system.b, linear.names, linear.inputs);
   }
   if (linear.c.rows() > 0) {
     std::cout << "\nC, of y = C x\n";
@@ -173,7 +204,7 @@ void print_text(const Linear& linear, const Eigen::VectorXcd& eigenvalues) {
   const double smallest = 1e-13 * eigenvalues.cwiseAbs().maxCoeff();  // smaller ones are rounding
   for (const std::complex<double>& one : eigenvalues) {
     std::cout << std::setw(15) << (std::abs(one.real()) < smallest ? "0" : rounded(one.real(), 6));
-    if (std::abs(one.imag()) >= smallest) {
+    if (std::abs(one.imag()) > smallest) {
       const Swing swing = swing_of(one, linear.step);
       const double damping = std::abs(swing.damping) < 1e-12 ? 0 : swing.damping;
       const std::string imaginary = (one.imag() < 0 ? " - " : " + ") + rounded(std::abs(one.imag()), 6) + " i";
@@ -194,7 +225,7 @@ ExitStatus linearize(const LinearizeOptions& options) {
         return io::told_at_keys(scenario, options.scenario, [&] { return linear_of(scenario, options, guard); });
       },
       read_scenario(options.scenario, options.overrides, options.json));
-  const Eigen::VectorXcd rates = eigenvalues(linear.a.data(), linear.a.rows());
+  const Eigen::VectorXcd rates = eigenvalues(linear.system.a);
   if (options.json)
     print_json(linear, options, rates);
   else

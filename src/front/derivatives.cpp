@@ -7,7 +7,6 @@
 #include <cstddef>
 #include <memory>
 #include <pendula/numeric/directions.hpp>
-#include <pendula/run/inputs.hpp>
 #include <pendula/run/run_failed.hpp>
 #include <pendula/run/subject.hpp>
 #include <pendula/system/motion.hpp>
@@ -26,10 +25,6 @@ using Given = Eigen::Map<const Directions<>>;
 
 Eigen::Index index(std::size_t size) {
   return static_cast<Eigen::Index>(size);
-}
-
-std::shared_ptr<const Subject> holding(const pendula_model& model, const double* inputs) {
-  return inputs == nullptr ? model.subject : with_inputs(model.subject, {inputs, model.inputs.size()});
 }
 
 /// The subject, options and start of a path, which a MotionTask refers to.

@@ -158,6 +158,10 @@ void write(const Motion& motion, double* q, double* v) {
   if (v != nullptr) std::ranges::copy(motion.v, v);
 }
 
+std::shared_ptr<const Subject> holding(const pendula_model& model, const double* inputs) {
+  return inputs == nullptr ? model.subject : with_inputs(model.subject, {inputs, model.inputs.size()});
+}
+
 void write_row(const Subject& subject, const Motion& motion, double* row) {
   std::vector<double> numbers;
   subject.append_row(motion, subject.observe(motion), numbers);
@@ -289,9 +293,10 @@ pendula_status pendula_assemble(const pendula_model* model, double time, const i
   });
 }
 
-pendula_status pendula_row(const pendula_model* model, double time, const double* q, const double* v, double* row) {
+pendula_status pendula_row(const pendula_model* model, double time, const double* q, const double* v,
+                           const double* inputs, double* row) {
   return guarded([&] {
-    write_row(*model->subject, motion_of(*model, time, q, v), row);
+    write_row(*holding(*model, inputs), motion_of(*model, time, q, v), row);
     return PENDULA_OK;
   });
 }

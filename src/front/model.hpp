@@ -21,6 +21,8 @@ namespace pendula::front {
 
 /// A motion from q and v; if v is null, rates are 0. Throws std::invalid_argument if q is null, or a number not finite.
 Motion motion_of(const pendula_model& model, double time, const double* q, const double* v);
+/// The subject with these inputs; its own where they are null.
+std::shared_ptr<const Subject> holding(const pendula_model& model, const double* inputs);
 
 void write(const Motion& motion, double* q, double* v);
 

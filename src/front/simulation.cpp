@@ -242,7 +242,18 @@ pendula_status pendula_finish(pendula_simulation* simulation) {
 
 pendula_status pendula_linearize(const pendula_simulation* simulation, double* a, double* b) {
   return guarded([&] {
-    linearize(simulation->mover.subject(), simulation->mover.motion(), a, b);
+    const Linearized found = linearize(simulation->mover.subject(), simulation->mover.motion());
+    if (a != nullptr) std::copy_n(found.a.data(), found.a.size(), a);
+    if (b != nullptr) std::copy_n(found.b.data(), found.b.size(), b);
+    return PENDULA_OK;
+  });
+}
+
+pendula_status pendula_independent(const pendula_simulation* simulation, int* count, int* coordinates) {
+  return guarded([&] {
+    const Independent found = find_independent(simulation->mover.subject(), simulation->mover.motion());
+    *count = static_cast<int>(found.coordinates.size());
+    std::ranges::transform(found.coordinates, coordinates, [](std::size_t k) { return static_cast<int>(k); });
     return PENDULA_OK;
   });
 }

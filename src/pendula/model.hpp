@@ -52,7 +52,7 @@ class Model {
   std::vector<double> row(const Motion& motion) const {
     require(motion);
     std::vector<double> numbers(pendula_columns(get()));
-    detail::require(pendula_row(get(), motion.time, motion.q.data(), motion.v.data(), numbers.data()));
+    detail::require(pendula_row(get(), motion.time, motion.q.data(), motion.v.data(), nullptr, numbers.data()));
     return numbers;
   }
 

@@ -104,8 +104,9 @@ const char* pendula_parameter_name(const pendula_model* model, size_t parameter)
 const char* pendula_parameter_unit(const pendula_model* model, size_t parameter);
 /* Writes the values of the parameters, (pendula_parameters()). */
 void pendula_parameter_values(const pendula_model* model, double* values);
-/* Writes the numbers of one row, (pendula_columns()). */
-pendula_status pendula_row(const pendula_model* model, double time, const double* q, const double* v, double* row);
+/* Writes the numbers of one row, (pendula_columns()). Inputs are held; NULL: those of the model. */
+pendula_status pendula_row(const pendula_model* model, double time, const double* q, const double* v,
+                           const double* inputs, double* row);
 
 /* Writes the kinetic and the potential energy of a motion, (2)  [J]; of a system whose energy is h = v.dL/dv - L the
  * second number is what is left of h. */
@@ -195,9 +196,12 @@ pendula_status pendula_on_rows(pendula_simulation* simulation, double interval,
 /* Ends all rows and closes their files. pendula_simulation_free() does so, too, but reports no error. */
 pendula_status pendula_finish(pendula_simulation* simulation);
 
-/* d(q, v)/dt = A (q, v) + B inputs, linearised about the current motion; row by row: A is (2n, 2n), B (2n, inputs).
- * Either may be NULL. */
+/* dx/dt = A x + B inputs, linearised about the current motion, x = (independent coordinates, their rates); row by row:
+ * A is (2d, 2d), B (2d, inputs). Either may be NULL. */
 pendula_status pendula_linearize(const pendula_simulation* simulation, double* a, double* b);
+/* The d coordinates from which the others follow by constraints, ascending: their number, and which they are, in room
+ * for n. Without constraints all are. */
+pendula_status pendula_independent(const pendula_simulation* simulation, int* count, int* coordinates);
 
 /* --- Derivatives --- */
 

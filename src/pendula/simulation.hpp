@@ -214,10 +214,20 @@ class Simulation {
   /// Stops advances, also within long steps, when a stop is requested. Copies do not heed it.
   void heed(std::stop_token stop) { guard_->stop = std::move(stop); }
 
-  /// d(q, v)/dt = A (q, v) + B inputs, linearised exactly about the current motion: A is (2n x 2n), B (2n x inputs).
+  /// The coordinates from which the others follow by constraints here, d of them, ascending; without constraints all.
+  std::vector<int> independent() const {
+    std::vector<int> found(model_.coordinates());
+    int count = 0;
+    detail::require(pendula_independent(get(), &count, found.data()));
+    found.resize(static_cast<std::size_t>(count));
+    return found;
+  }
+
+  /// dx/dt = A x + B inputs, x = (independent coordinates, their rates), linearised exactly about the current motion:
+  /// A is (2d x 2d), B (2d x inputs).
   std::pair<Eigen::MatrixXd, Eigen::MatrixXd> linearize() const {
     using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
-    const auto n = static_cast<Eigen::Index>(2 * model_.coordinates());
+    const auto n = static_cast<Eigen::Index>(2 * independent().size());
     RowMajor a(n, n), b(n, static_cast<Eigen::Index>(model_.inputs()));
     detail::require(pendula_linearize(get(), a.data(), b.data()));
     return {a, b};

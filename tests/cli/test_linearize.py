@@ -164,3 +164,24 @@ def test_rows_and_columns_are_in_the_order_of_names(pendula, tmp_path):
     assert found["names"] == ["a_1", "b_1", "a_2", "a_dot_1", "b_dot_1", "a_dot_2"]
     assert found["state"] == [1, 0, 0, 0, 0, 0]
     assert [found["A"][3 + k][k] for k in range(3)] == [-1, -4, -9]
+
+
+def test_a_linkage_has_the_linear_system_of_its_freedom(pendula, tmp_path):
+    """A slider crank with a crank of r = 0.3 m that stands level, its rod along it: all forces are by hand."""
+    (tmp_path / "slider.toml").write_text(
+        '[system]\nmodel = "slider_crank"\n[start]\nrod = 0.0\ns = 1.2\n[run]\nduration = 1.0\n'
+    )
+    for arguments in ((), ("--at", "equilibrium")):
+        found = pendula(
+            "linearize", "slider.toml", "--set", "system.parameters.gravity=0", *arguments, "--json"
+        ).json
+        assert found["names"] == ["crank", "crank_dot"] and found["state"] == [0, 0]
+        # The rod turns by -1/3 of the crank's turn, and its middle moves up by 0.15 of it; the slider rests.
+        inertia = 0.05 + 0.5 * 0.15**2 + 0.5 * 0.9**2 / 12 / 9
+        assert found["A"] == [[0, 1], [pytest.approx(0, abs=1e-14), 0]]  # measured 0
+        assert found["B"] == [[0, 0], [pytest.approx(1 / inertia, rel=1e-14), pytest.approx(0, abs=1e-14)]]
+        basis = found["basis"]
+        assert basis["names"] == ["crank", "rod", "s", "crank_dot", "rod_dot", "s_dot"]
+        assert [row[0] for row in basis["T"][:3]] == pytest.approx([1, -1 / 3, 0], abs=1e-15)
+    text = pendula("linearize", "slider.toml").out
+    assert "T, of their deviations T x: the constraints leave x free" in text

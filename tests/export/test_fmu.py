@@ -640,3 +640,61 @@ def test_fmpy_simulates_what_the_program_does_where_it_is_installed(
     )
     theirs = [*final["q"].values(), *final["v"].values(), *final["points"]["bob_2"]]
     assert [rows[name][-1] for name in wanted] == pytest.approx(theirs, rel=bound, abs=bound)
+
+
+LINKAGE = """
+[system]
+model = "four_bar"
+[[system.drive]]
+input = "torque"
+constant = 0.3
+[start]
+theta_1 = 1.5
+theta_dot_1 = 9.0
+theta_2 = 1.0
+theta_3 = -2.6
+assemble = ["theta_2", "theta_3", "theta_dot_2", "theta_dot_3"]
+[run]
+duration = 2.0
+tolerance = 1e-12
+"""
+
+
+def test_a_linkage_keeps_its_constraints_by_co_simulation_alone(pendula, tmp_path):
+    (tmp_path / "linkage.toml").write_text(LINKAGE)
+    place = unpacked(pendula, tmp_path, tmp_path / "linkage.toml")
+    assert ElementTree.parse(place / "modelDescription.xml").getroot().find("ModelExchange") is None
+    fmu = Fmu(place)
+    fmu.run(0.0, 200, 0.01)
+    theirs = simulated(pendula, tmp_path, LINKAGE)
+    assert distance(fmu, theirs) < 1e-10  # measured 2.2e-13
+    ended = pendula("simulate", tmp_path / "linkage.toml", "-o", tmp_path / "rows.csv")
+    assert ended.returncode == 0
+    head, *_, row = (tmp_path / "rows.csv").read_text().splitlines()
+    forces = {n: float(x) for n, x in zip(head.split(","), row.split(","), strict=True) if "force" in n}
+    assert [*forces] == ["force_loop_x", "force_loop_y"]
+    assert fmu.get(*forces) == pytest.approx([*forces.values()], rel=1e-8)
+    # Another length of the crank: the others close around it, as they do from a start.
+    fmu.set(crank=0.35)
+    fmu.run(2.0, 1, 0.01)
+    angles, lengths = fmu.get("theta_1", "theta_2", "theta_3"), (0.35, 1.1, 0.8)
+    ends = [
+        sum(length * of(angle) for length, angle in zip(lengths, angles, strict=True))
+        for of in (math.sin, math.cos)
+    ]
+    assert ends == pytest.approx([1, 0], abs=1e-12)
+
+
+def test_a_linkage_closes_before_its_first_step_or_that_is_told(pendula, tmp_path):
+    fmu = Fmu(unpacked(pendula, tmp_path, "four_bar"))
+    angles = "theta_1", "theta_2", "theta_3"
+    fmu.set(theta_1=1.0, theta_2=1.0, theta_3=-2.8)
+    assert fmu.library.fmi3ExitInitializationMode(fmu.instance) == OK
+    closed = fmu.get(*angles)
+    assert closed == pytest.approx([1.0, 1.0, -2.8], abs=0.2)
+    across = sum(x * math.sin(angle) for x, angle in zip((0.4, 1.1, 0.8), closed, strict=True))
+    assert across == pytest.approx(1, abs=1e-14)
+    fmu.set(ground=5.0)
+    assert fmu.step(0.0, 0.01) == ERROR
+    assert fmu.said and "loop_x" in fmu.said[-1]
+    assert fmu.get(*angles) == closed

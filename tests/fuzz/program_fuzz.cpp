@@ -26,7 +26,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   const std::size_t n = pendula_coordinates(model);
   const std::vector<double> q(n, 0.3), v(n, -0.1);
   std::vector<double> row(pendula_columns(model)), field(2 * n), energies(2);
-  pendula_row(model, 0, q.data(), v.data(), row.data());
+  pendula_row(model, 0, q.data(), v.data(), nullptr, row.data());
   pendula_energies(model, 0, q.data(), v.data(), energies.data());
   pendula_field(model, 0, q.data(), v.data(), nullptr, field.data());
   require_known("evaluating");

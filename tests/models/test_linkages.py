@@ -141,7 +141,35 @@ PARALLEL_START = "".join(
     f"{name} = {value}\n"
     for name, value in zip("abcd", (math.sin(1), -math.cos(1), 2 + math.sin(1), -math.cos(1)), strict=True)
 )
-LINKAGES = {"angles": (ANGLES, ANGLES_START), "bobs": (BOBS, BOBS_START), "slider": (SLIDER, SLIDER_START)}
+# Two bobs in space between two hooks, by three bars.
+SPACE = """
+def define(model, links):
+    g = model.parameter("g", "m/s^2", default=9.81)
+    a, b = ([model.coordinate(f"{axis}_{k}", "m") for axis in "xyz"] for k in (1, 2))
+    squared = [sum(model.rate(each) ** 2 for each in bob) for bob in (a, b)]
+    model.lagrangian = squared[0] / 2 + squared[1] - g * (a[2] + 2 * b[2])
+    hook = (1.6, 0.4, 0.3)
+    model.constraint("first", (sum(x**2 for x in a) - 1) / 2, "m^2")
+    model.constraint("middle", (sum((x - y) ** 2 for x, y in zip(a, b)) - 1.5**2) / 2, "m^2")
+    model.constraint("last", (sum((x - y) ** 2 for x, y in zip(b, hook)) - 1.2**2) / 2, "m^2")
+"""
+SPACE_START = """
+x_1 = 0.8
+y_1 = 0.3
+z_1 = -0.5
+x_2 = 2.0
+y_2 = 0.6
+z_2 = -0.9
+y_dot_1 = 0.7
+z_dot_2 = 0.4
+assemble = ["x_1", "y_1", "z_1", "x_2", "y_2", "z_2", "x_dot_1", "z_dot_1", "x_dot_2", "y_dot_2"]
+"""
+LINKAGES = {
+    "angles": (ANGLES, ANGLES_START),
+    "bobs": (BOBS, BOBS_START),
+    "slider": (SLIDER, SLIDER_START),
+    "space": (SPACE, SPACE_START),
+}
 
 
 @pytest.fixture
@@ -204,7 +232,7 @@ MANY_STAGES = {5: (8, 12, 16, 20, 24), 6: (6, 8, 10, 12, 16), 7: (5, 6, 8, 10, 1
 def test_orders_of_many_stages(name, scenario, simulate):
     """Errors change their signs, so that orders are those of a line through five of them."""
     file = scenario(*LINKAGES[name])
-    pace = 2 if name == "slider" else 1
+    pace = {"slider": 2, "space": 0.7}.get(name, 1)
     truth = last(simulate(file, run__stages=8, run__step=1 / 256, run__iteration="newton"))
     for stages, steps in MANY_STAGES.items():
         runs = [
@@ -249,6 +277,33 @@ def test_damping_faster_than_a_step(damping, scenario, simulate, pendulum):
     assert abs(math.atan2(found["x"], -found["y"]) - pendulum(0.8, math.pi / 2, damping)) < 1e-9
 
 
+WALL = """
+from sympy import Piecewise, cos, sin
+def define(model, links):
+    x, y = PLACE
+    model.lagrangian = SPEED_SQUARED / 2 - 9.81 * y - Piecewise((200 * (x - 0.3)**2, x > 0.3), (0, True))
+"""
+BY_ROD = """    model.constraint("rod", (x**2 + y**2 - 1) / 2, "m^2")
+"""
+
+
+@pytest.mark.parametrize("settings", [{"run__accuracy": 1e-10, "run__step": ""}, {"run__stages": 8}])
+def test_pieces_meet_between_steps(settings, scenario, simulate):
+    """A bob on a rod runs into a soft wall, as the pendulum by its angle does."""
+    by_rod = WALL.replace("PLACE", 'model.coordinate("x", "m"), model.coordinate("y", "m")')
+    by_rod = by_rod.replace("SPEED_SQUARED", "(model.rate(x)**2 + model.rate(y)**2)") + BY_ROD
+    rod = simulate(scenario(by_rod, "x = -0.8\ny = -0.6"), run__duration=10, **settings)
+    by_angle = WALL.replace(
+        "x, y = PLACE", 'theta = model.coordinate("theta", "rad")\n    x, y = sin(theta), -cos(theta)'
+    )
+    by_angle = by_angle.replace("SPEED_SQUARED", "model.rate(theta)**2")
+    angle = simulate(scenario(by_angle, "theta = -0.9272952180016122"), run__duration=10, **settings)
+    assert max(rod["constraint_error"].values()) < 1e-14
+    place, theta = rod["final"]["q"], angle["final"]["q"]["theta"]
+    # Measured off by 2.4e-12 by accuracy, 7.8e-16 by steps.
+    assert max(abs(place["x"] - math.sin(theta)), abs(place["y"] + math.cos(theta))) < 1e-9
+
+
 @pytest.mark.parametrize("iteration", ["fixed-point", "newton"])
 def test_a_constraint_that_follows_from_others(iteration, scenario, pendula, pendulum):
     """A parallelogram with a third crank is a pendulum; the three forces are not unique, and that is said."""
@@ -278,6 +333,13 @@ def test_constraints_may_move(scenario, simulate):
     assert abs(q["x_l"] - 0.0493455784275) < 1e-9
     assert abs(q["x_r"] - 1.0417425248854) < 1e-9
     assert abs(v["y_r"] - 0.770341043780) < 1e-8
+
+
+def test_a_car_axis_by_accuracy(scenario, simulate):
+    found = simulate(scenario(CAR_AXIS, CAR_AXIS_START), run__accuracy=1e-10, run__step="", run__duration=3)
+    truth = {"x_l": 0.0493455784275, "y_l": 0.4969894602300, "x_r": 1.0417425248854, "y_r": 0.3739110272654}
+    off = max(abs(found["final"]["q"][name] - value) for name, value in truth.items())
+    assert off < 1e-10, off  # measured 2.8e-14: every printed digit is right
 
 
 def test_forces_are_columns(scenario, rows):

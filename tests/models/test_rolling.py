@@ -352,6 +352,53 @@ def test_forces_are_columns(scenario, rows, pendula):
     assert max(abs(force - expected) for force in found["force_rolls_x"]) < 1e-12  # measured 2.2e-16
 
 
+SKATE = """
+from sympy import cos, sin
+
+
+def define(model, links):
+    x, y, phi = (model.coordinate(*each) for each in (("x", "m"), ("y", "m"), ("phi", "rad")))
+    model.lagrangian = (model.rate(x) ** 2 + model.rate(y) ** 2) / 2 + model.rate(phi) ** 2 / 10 + 2.5 * x
+    model.force(x, model.input("push", "N"))
+    model.constraint("blade", model.rate(y) * cos(phi) - model.rate(x) * sin(phi), "m/s")
+"""
+
+
+def test_events(scenario, pendula, tmp_path):
+    """A skate on a slope is highest or lowest where it has turned by quarters."""
+    file = scenario(SKATE, "phi_dot = 1.5")
+    file.write_text(file.read_text() + '[[event]]\nname = "turns"\nwhen = "x_dot"\n')
+    events = tmp_path / "events.csv"
+    options = ("--set=run.duration=20.0", "--set=run.step=", "--set=run.accuracy=1e-11", f"--events={events}")
+    ended = pendula("simulate", file, "--quiet", *options)
+    assert ended.returncode == 0, ended.stderr
+    times = [float(line.split(",")[1]) for line in events.read_text().splitlines()[1:]]
+    assert len(times) == 19
+    assert max(abs(t - k * math.pi / 3) for k, t in enumerate(times, start=1)) < 1e-9
+
+
+def test_a_run_goes_on_as_if_it_had_not_ended(scenario, pendula, tmp_path):
+    file, run = scenario(DISC, DISC_START), tmp_path / "run.h5"
+    whole = json.loads(pendula("simulate", file, "--json", "--set=run.duration=3.0").stdout)["final"]
+    ended = pendula("simulate", file, "--quiet", "-o", run)
+    assert ended.returncode == 0, ended.stderr
+    ended = pendula("simulate", "--resume", run, "--json", "--set=run.duration=3.0")
+    assert ended.returncode == 0, ended.stderr
+    assert json.loads(ended.stdout)["final"] == whole
+
+
+@pytest.mark.parametrize("by", ["compiler", "interpreter"])
+def test_feedback(by, scenario, pendula):
+    """What holds a skate on a slope lets it go in a circle."""
+    push = '[[system.feedback]]\ninput = "push"\nvalue = "-2.5 + t - t"\nsample = 0.02\n'
+    file = scenario(SKATE, "x_dot = 0.6\nphi_dot = 1.5", push)
+    ended = pendula("simulate", file, "--json", "--set=run.stages=6", PENDULA_KERNELS_BY=by)
+    assert ended.returncode == 0, ended.stderr
+    found = json.loads(ended.stdout)["final"]["q"]
+    circle = 0.4 * math.sin(3.0), 0.4 * (1 - math.cos(3.0))
+    assert math.dist((found["x"], found["y"]), circle) < 1e-12
+
+
 REFUSED = {
     "run.method": ("rk4", "method: expected gauss, got rk4, for a system with constraints"),
     "run.form": ("velocity", "form: expected momentum, got velocity, for a system with constraints"),
@@ -366,9 +413,14 @@ def test_what_cannot_keep_constraints(key, scenario, pendula):
     assert told in ended.stderr
 
 
-def test_commands_that_do_not_know_them(scenario, pendula):
+def test_commands_that_do_not_know_them(scenario, pendula, tmp_path):
     file = scenario(UPRIGHT, "theta_dot = 1.0\nphi_dot = 1.0")
     for command in ("lyapunov", "linearize"):
         ended = pendula(command, file)
         assert ended.returncode == 2
-        assert "for a system with constraints" in ended.stderr
+        assert "for a system with constraints of rates (rolls_x)" in ended.stderr
+    ended = pendula("export", file, "--as", "c", "-o", tmp_path / "out")
+    assert (ended.returncode, "constraints of rates, got one with rolls_x, rolls_y" in ended.stderr) == (
+        2,
+        True,
+    )

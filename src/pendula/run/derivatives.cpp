@@ -106,15 +106,7 @@ void require_rows(const char* what, const Directions<>& got, Eigen::Index rows, 
 }
 
 void find_accelerations(const SystemSubject& subject, const Motion& motion, double* found) {
-  SystemAt<1> here(system_model_of(subject, motion));
-  here.set_time(motion.time);
-  here(&SystemFunctions::acceleration, motion.q.data(), motion.v.data(), found);
-  if (subject.info().constraints.empty()) return;
-  ConstraintForces forces(subject.info());
-  Eigen::VectorXd lambda(static_cast<Eigen::Index>(forces.count()));
-  forces.look(here, motion.q.data());
-  forces.find(here, motion.q.data(), motion.v.data(), found, lambda.data());
-  forces.move(lambda.data(), found);
+  find_accelerations(system_model_of(subject, motion), motion.time, motion.q.data(), motion.v.data(), found);
 }
 
 template <class Space>

@@ -2,46 +2,168 @@
 #include <Eigen/LU>
 #include <Eigen/QR>
 #include <algorithm>
+#include <cmath>
 #include <cstddef>
-#include <pendula/numeric/pack_rows.hpp>
+#include <numeric>
+#include <pendula/run/assembly.hpp>
 #include <pendula/run/derivatives.hpp>
 #include <pendula/run/linearize.hpp>
 #include <pendula/run/subject_kinds.hpp>
+#include <pendula/system/constraint_forces.hpp>
 #include <pendula/system/no_constraints.hpp>
 #include <pendula/system/parameter_slopes.hpp>
+#include <pendula/system/state_slopes.hpp>
 #include <pendula/system/system_model.hpp>
 #include <stdexcept>
+#include <utility>
+#include <vector>
 
 namespace pendula {
 namespace {
 
-using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
-
-/// Fills A column by column, `width` columns at once: by coordinates, then by rates.
-void find_a(SystemAt<8>& here, const Motion& motion, double* a) {
-  constexpr std::size_t width = 8;
-  const auto n = static_cast<std::size_t>(motion.q.size());
-  Eigen::Map<RowMajor> all(a, 2 * motion.q.size(), 2 * motion.q.size());
-  all.setZero();
-  all.topRightCorner(motion.q.size(), motion.q.size()).setIdentity();
-  PackRows<width> numbers(6 * n);
-  for (std::size_t k = 0; k < n; ++k) {
-    std::fill_n(numbers[k], width, motion.q[static_cast<Eigen::Index>(k)]);
-    std::fill_n(numbers[n + k], width, motion.v[static_cast<Eigen::Index>(k)]);
+/// A system at one motion, its masses, and derivatives of its functions.
+class Beside {
+ public:
+  Beside(const SystemModel& model, const Motion& motion)
+      : n_(motion.q.size()), here_(model), slopes_(model), motion_(motion), masses_(n_, n_) {
+    here_.set_time(motion.time);
+    here_(&SystemFunctions::mass_matrix, motion.q.data(), masses_.data());
+    factors_.compute(masses_);
   }
-  for (std::size_t first = 0; first < 2 * n; first += width) {
-    const std::size_t count = std::min(width, 2 * n - first);
-    std::fill_n(numbers[2 * n], 2 * n * width, 0.0);
-    for (std::size_t lane = 0; lane < count; ++lane) numbers[2 * n + first + lane][lane] = 1;
-    here(&SystemFunctions::acceleration_along, numbers[0], numbers[n], numbers[2 * n], numbers[3 * n], numbers[4 * n],
-         numbers[5 * n]);
-    for (std::size_t k = 0; k < n; ++k) {
-      for (std::size_t lane = 0; lane < count; ++lane) {
-        all(static_cast<Eigen::Index>(n + k), static_cast<Eigen::Index>(first + lane)) = numbers[5 * n + k][lane];
+
+  const SystemAt<1>& here() const { return here_; }
+  const Directions<>& masses() const { return masses_; }
+  Eigen::MatrixXd moved(const Eigen::MatrixXd& forces) const { return factors_.solve(forces); }
+
+  Directions<> acceleration() { return slopes_.acceleration(motion_.time, motion_.q.data(), motion_.v.data()); }
+  std::pair<Directions<>, Directions<>> constraint_rates(const Eigen::VectorXd& v) {
+    return slopes_.constraint_rates(motion_.time, motion_.q.data(), v.data());
+  }
+
+  /// Of the momenta, M v + …, by coordinates, where rates are `v`  (n x n).
+  Directions<> momentum(const Eigen::VectorXd& v) const {
+    Eigen::VectorXd p(n_), f(n_);
+    Directions<> p_D_q(n_, n_), p_D_v(n_, n_), f_D_q(n_, n_), f_D_v(n_, n_);
+    here_(&SystemFunctions::momentum_form_with_jacobians, motion_.q.data(), v.data(), p.data(), f.data(), p_D_q.data(),
+          p_D_v.data(), f_D_q.data(), f_D_v.data());
+    return p_D_q;
+  }
+
+ private:
+  Eigen::Index n_;
+  SystemAt<1> here_;
+  StateSlopes slopes_;
+  const Motion& motion_;
+  Directions<> masses_;
+  Eigen::PartialPivLU<Eigen::MatrixXd> factors_;
+};
+
+/// Which coordinates follow from others: of the columns of G, as masses weigh them, from the last to the first, as many
+/// as do not depend on each other.
+std::vector<bool> dependent(Eigen::MatrixXd slopes, const Directions<>& masses, Eigen::Index count) {
+  const Eigen::Index n = slopes.cols();
+  for (Eigen::Index k = 0; k < n; ++k) slopes.col(k) /= std::sqrt(masses(k, k));
+  const double largest = n > 0 ? slopes.colwise().norm().maxCoeff() : 0;
+  std::vector<bool> chosen;
+  // The first bound that is low enough for all of them: those that follow badly would move far with the others.
+  for (double least = 0.1; least > 1e-16; least /= 10) {
+    Eigen::MatrixXd left = slopes;
+    Eigen::Index found = 0;
+    chosen.assign(static_cast<std::size_t>(n), false);
+    for (Eigen::Index k = n; k-- > 0 && found < count;) {
+      const double size = left.col(k).norm();
+      if (!(size > least * largest)) continue;
+      const Eigen::VectorXd direction = left.col(k) / size;
+      left -= direction * (direction.transpose() * left).eval();
+      chosen[static_cast<std::size_t>(k)] = true;
+      ++found;
+    }
+    if (found == count) break;
+  }
+  return chosen;
+}
+
+Independent all_of(Eigen::Index n) {
+  std::vector<std::size_t> numbers(static_cast<std::size_t>(n));
+  std::iota(numbers.begin(), numbers.end(), std::size_t{0});
+  return {.coordinates = numbers, .basis = Directions<>::Identity(2 * n, 2 * n)};
+}
+
+/// Constraints at one motion: forces that keep them, and how they change.
+class ConstraintsBeside {
+ public:
+  ConstraintsBeside(const SystemModel& model, const Motion& motion, Beside& beside)
+      : n_(motion.q.size()),
+        m_(std::ssize(model.info().constraints)),
+        forces_(model.info()),
+        beside_(beside),
+        slope_(m_, n_),
+        resisting_(n_, m_) {
+    if (m_ == 0) return;
+    forces_.look(beside.here(), motion.q.data());
+    for (Eigen::Index i = 0; i < m_; ++i) {
+      for (Eigen::Index k = 0; k < n_; ++k) {
+        slope_(i, k) = forces_.slope(static_cast<std::size_t>(i), static_cast<std::size_t>(k));
       }
     }
+    Eigen::MatrixXd inverse(m_, m_);
+    for (Eigen::Index i = 0; i < m_; ++i) {
+      for (Eigen::Index j = 0; j < m_; ++j) {
+        inverse(i, j) = forces_.inverse(static_cast<std::size_t>(i), static_cast<std::size_t>(j));
+      }
+    }
+    resisting_ = beside.moved(slope_.transpose()) * inverse;
   }
-}
+
+  Independent independent(const Motion& motion) {
+    if (m_ == 0) return all_of(n_);
+    const std::vector<bool> follows =
+        dependent(slope_, beside_.masses(), static_cast<Eigen::Index>(forces_.independent()));
+    Independent found;
+    std::vector<Eigen::Index> others;
+    for (std::size_t k = 0; k < follows.size(); ++k) {
+      if (follows[k]) others.push_back(static_cast<Eigen::Index>(k));
+      if (!follows[k]) found.coordinates.push_back(k);
+    }
+    const Eigen::Index d = std::ssize(found.coordinates);
+    const Eigen::MatrixXd kept = slope_(Eigen::all, found.coordinates);
+    const Eigen::ColPivHouseholderQR<Eigen::MatrixXd> factors(Eigen::MatrixXd(slope_(Eigen::all, others)));
+    const Eigen::MatrixXd following = -factors.solve(kept);
+    Eigen::MatrixXd places = Eigen::MatrixXd::Zero(n_, d);
+    places(found.coordinates, Eigen::all).setIdentity();
+    places(others, Eigen::all) = following;
+    const Eigen::MatrixXd turned = beside_.constraint_rates(motion.v).first.leftCols(n_) * places;
+    found.basis = Directions<>::Zero(2 * n_, 2 * d);
+    found.basis.topLeftCorner(n_, d) = found.basis.bottomRightCorner(n_, d) = places;
+    Eigen::MatrixXd rates = Eigen::MatrixXd::Zero(n_, d);
+    rates(others, Eigen::all) = -factors.solve(turned);
+    found.basis.bottomLeftCorner(n_, d) = rates;
+    return found;
+  }
+
+  /// Makes derivatives of accelerations without constraints  (n x 2n) those of accelerations with them.
+  ///   M (δa − δa_free) = −(δM) M⁻¹Gᵀλ + (δG)ᵀ λ + Gᵀ δλ,   G δa + (δG) a + δ(d²g/dt² without accelerations) = 0.
+  void constrain(const Motion& motion, Directions<>& acceleration) {
+    Eigen::VectorXd free(n_), lambda(m_);
+    beside_.here()(&SystemFunctions::acceleration, motion.q.data(), motion.v.data(), free.data());
+    forces_.find(beside_.here(), motion.q.data(), motion.v.data(), free.data(), lambda.data());
+    const Eigen::VectorXd none = Eigen::VectorXd::Zero(n_), pulled = beside_.moved(slope_.transpose() * lambda);
+    Directions<> turned(n_, n_);
+    forces_.find_curvature(beside_.here(), motion.q.data(), lambda.data(), turned.data());
+    acceleration.leftCols(n_) += beside_.moved(turned - (beside_.momentum(pulled) - beside_.momentum(none)));
+    Directions<> lacking = slope_ * acceleration + beside_.constraint_rates(motion.v).second;
+    lacking.leftCols(n_) +=
+        (beside_.constraint_rates(free + pulled).first - beside_.constraint_rates(none).first).leftCols(n_);
+    acceleration -= resisting_ * lacking;
+  }
+  void constrain_inputs(Directions<>& by_inputs) const { by_inputs -= resisting_ * (slope_ * by_inputs); }
+
+ private:
+  Eigen::Index n_, m_;
+  ConstraintForces forces_;
+  Beside& beside_;
+  Eigen::MatrixXd slope_, resisting_;  // G, M⁻¹ Gᵀ K⁻¹
+};
 
 bool changes_with_time(const Subject& subject) {
   if (subject.part_at(0)) return true;
@@ -54,37 +176,75 @@ bool changes_with_time(const Subject& subject) {
   });
 }
 
-// Inputs change forces only: M δa = δf.
-void find_b(const SystemModel& model, const Motion& motion, double* b) {
-  const Eigen::Index n = motion.q.size(), inputs = static_cast<Eigen::Index>(model.inputs());
-  Eigen::Map<RowMajor> all(b, 2 * n, inputs);
-  SystemAt<1> here(model);
-  here.set_time(motion.time);
-  RowMajor mass(n, n);
-  here(&SystemFunctions::mass_matrix, motion.q.data(), mass.data());
-  ParameterSlopes slopes(model);
-  slopes.evaluate(motion.time, motion.q.data(), motion.v.data());
-  all.topRows(n).setZero();
-  all.bottomRows(n) = mass.partialPivLu().solve(slopes.f.rightCols(inputs));
+/// Brings coordinates that follow from others back onto the constraints. Returns whether that is done.
+bool bring_back_others(const Subject& subject, const Independent& independent, Motion& motion) {
+  std::vector<bool> follow(static_cast<std::size_t>(motion.q.size()), true);
+  for (const std::size_t k : independent.coordinates) follow[k] = false;
+  return as_its_kind(subject, [&](const auto& kind) {
+    if constexpr (requires { kind.info(); }) return bring_back(kind, follow, motion).empty();
+    return true;
+  });
+}
+
+SystemModel regular_model(const Subject& subject, const Motion& motion) {
+  require_regular(subject, motion);
+  const SystemModel model =
+      as_its_kind_at(subject, motion.time, [&](const auto& kind) { return system_model_of(kind, motion); });
+  require_no_constraints_of_rates(model.info(), "linearization: expected constraints of positions only");
+  return model;
 }
 
 }  // namespace
 
-void linearize(const Subject& subject, const Motion& motion, double* a, double* b) {
-  require_regular(subject, motion);
-  const SystemModel model =
-      as_its_kind_at(subject, motion.time, [&](const auto& kind) { return system_model_of(kind, motion); });
-  require_no_constraints(model.info(), "linearization: expected a system whose coordinates are free");
-  if (a != nullptr) {
-    SystemAt<8> here(model);
-    here.set_time(motion.time);
-    find_a(here, motion, a);
+Directions<> Independent::rows(const Directions<>& of_all) const {
+  const Eigen::Index d = std::ssize(coordinates), n = of_all.rows() / 2;
+  Directions<> found(2 * d, of_all.cols());
+  for (Eigen::Index k = 0; k < d; ++k) {
+    const auto place = static_cast<Eigen::Index>(coordinates[static_cast<std::size_t>(k)]);
+    found.row(k) = of_all.row(place);
+    found.row(d + k) = of_all.row(n + place);
   }
-  if (b != nullptr && model.inputs() > 0) find_b(model, motion, b);
+  return found;
 }
 
-Eigen::VectorXcd eigenvalues(const double* a, Eigen::Index size) {
-  return Eigen::MatrixXd(Eigen::Map<const RowMajor>(a, size, size)).eigenvalues();
+Independent find_independent(const Subject& subject, const Motion& motion) {
+  const bool has_constraints = as_its_kind_at(subject, motion.time, [](const auto& kind) {
+    if constexpr (requires { kind.info(); }) return !kind.info().constraints.empty();
+    return false;
+  });
+  if (!has_constraints) return all_of(motion.q.size());
+  const SystemModel model = regular_model(subject, motion);
+  Beside beside(model, motion);
+  return ConstraintsBeside(model, motion, beside).independent(motion);
+}
+
+Linearized linearize(const Subject& subject, const Motion& motion) {
+  const SystemModel model = regular_model(subject, motion);
+  const Eigen::Index n = motion.q.size(), inputs = static_cast<Eigen::Index>(model.inputs());
+  Beside beside(model, motion);
+  ConstraintsBeside constraints(model, motion, beside);
+  Directions<> by_state = beside.acceleration(), by_inputs(n, inputs);
+  if (inputs > 0) {  // they change forces only: M δa = δf
+    ParameterSlopes slopes(model);
+    slopes.evaluate(motion.time, motion.q.data(), motion.v.data());
+    by_inputs = beside.moved(slopes.f.rightCols(inputs));
+  }
+  if (!model.info().constraints.empty()) {
+    constraints.constrain(motion, by_state);
+    constraints.constrain_inputs(by_inputs);
+  }
+  Linearized found{.independent = constraints.independent(motion), .a = {}, .b = {}};
+  Directions<> a = Directions<>::Zero(2 * n, 2 * n), b = Directions<>::Zero(2 * n, inputs);
+  a.topRightCorner(n, n).setIdentity();
+  a.bottomRows(n) = by_state;
+  b.bottomRows(n) = by_inputs;
+  found.a = found.independent.rows(a * found.independent.basis);
+  found.b = found.independent.rows(b);
+  return found;
+}
+
+Eigen::VectorXcd eigenvalues(const Directions<>& a) {
+  return Eigen::MatrixXd(a).eigenvalues();
 }
 
 Motion equilibrium(const Subject& subject, const Motion& near) {
@@ -92,21 +252,25 @@ Motion equilibrium(const Subject& subject, const Motion& near) {
     throw std::invalid_argument("at: expected start for a system that changes with time, got equilibrium");
   }
   constexpr int most = 100;
-  constexpr double largest = 0.5, smallest = 1e-13;  // changes of a step, relative to the size of the coordinates
+  constexpr double smallest = 1e-13;  // changes of a step, relative to the size of the coordinates
   const Eigen::Index n = near.q.size();
   Motion at(near.time, near.q, Eigen::VectorXd::Zero(n));
-  RowMajor a(2 * n, 2 * n);
   for (int k = 0; k < most; ++k) {
-    linearize(subject, at, a.data(), nullptr);
-    const Eigen::VectorXd acceleration = field_at(subject, at).tail(n);
+    const auto [independent, a, b] = linearize(subject, at);
+    const Eigen::Index d = std::ssize(independent.coordinates);
+    const Eigen::VectorXd acceleration = independent.rows(field_at(subject, at)).bottomRows(d);
     if (!acceleration.allFinite() || !a.allFinite()) break;
-    Eigen::VectorXd change = -a.bottomLeftCorner(n, n).completeOrthogonalDecomposition().solve(acceleration);
+    const Eigen::MatrixXd stiffness = -a.bottomLeftCorner(d, d);
+    Eigen::VectorXd change =
+        independent.basis.topLeftCorner(n, d) * stiffness.completeOrthogonalDecomposition().solve(acceleration);
     const double size = change.cwiseAbs().maxCoeff(), scale = std::max(1.0, at.q.cwiseAbs().maxCoeff());
-    if (size > largest * scale) change *= largest * scale / size;
+    const double largest = (d < n ? 0.1 : 0.5) * scale;  // a linkage that jumps is another one
+    if (size > largest) change *= largest / size;
     at.q += change;
+    if (d < n && !bring_back_others(subject, independent, at)) break;
     if (size > smallest * scale) continue;
     // Where accelerations cannot vanish, the iteration ends at a minimum of the sum of their squares.
-    const double swing = a.bottomLeftCorner(n, n).cwiseAbs().maxCoeff();
+    const double swing = stiffness.cwiseAbs().maxCoeff();
     if (acceleration.cwiseAbs().maxCoeff() > 1e-9 * swing * scale) break;
     at.q = (at.q.array().abs() < smallest * scale).select(0, at.q);
     return at;

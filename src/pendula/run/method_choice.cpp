@@ -40,12 +40,10 @@ std::string against_series(const Subject& subject, double tolerance) {
 /// explicit steps.
 bool is_stiff(const Subject& subject, const Motion& place) {
   constexpr double much = 5;
-  const Eigen::Index n = 2 * place.q.size();
-  Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> a(n, n);
-  linearize(subject, place, a.data(), nullptr);
+  const Directions<> a = linearize(subject, place).a;
   if (!a.allFinite()) return true;
   double decay = 0, pace = place.v.cwiseAbs().maxCoeff();
-  for (const std::complex<double>& rate : eigenvalues(a.data(), n)) {
+  for (const std::complex<double>& rate : eigenvalues(a)) {
     decay = std::max(decay, -rate.real());
     pace = std::max({pace, rate.real(), std::abs(rate.imag())});
   }

@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <memory>
 #include <optional>
+#include <pendula/system/constraint_forces.hpp>
 #include <pendula/system/motion.hpp>
 #include <pendula/system/options.hpp>
 #include <pendula/system/plain_integrator.hpp>
@@ -189,7 +190,11 @@ inline Motion SwitchingSystem::ahead(const Sides& sides, const Motion& motion, d
 }
 
 inline std::vector<double> SwitchingSystem::accelerations(const Sides& sides, const Motion& motion) const {
-  return at(table_->of_1.acceleration, static_cast<std::size_t>(motion.v.size()), sides, motion);
+  const auto n = static_cast<std::size_t>(motion.v.size());
+  if (table_->info.constraints.empty()) return at(table_->of_1.acceleration, n, sides, motion);
+  std::vector<double> found(n);
+  find_accelerations({*table_, numbers(sides).plain()}, motion.time, motion.q.data(), motion.v.data(), found.data());
+  return found;
 }
 
 inline double SwitchingSystem::pace(const Sides& sides, const Motion& motion) const {

@@ -9,7 +9,6 @@
 #include <pendula/run/subject.hpp>
 #include <pendula/run/switching.hpp>
 #include <pendula/system/constraint_forces.hpp>
-#include <pendula/system/no_constraints.hpp>
 #include <pendula/system/plain_system.hpp>
 #include <pendula/system/system_model.hpp>
 #include <pendula/system/system_table.hpp>
@@ -75,7 +74,6 @@ class SystemSubject : public Subject {
       throw std::invalid_argument("solver: the chain solver is for chains, got chain; dense is for any system");
     }
     if (!switches().empty()) {
-      require_no_constraints(info(), "model: expected no functions of several pieces yet, got some");
       return std::make_unique<Integrator>(make_switching_integrator(switching(), options),
                                           static_cast<Eigen::Index>(info().coordinates.size()), "system");
     }

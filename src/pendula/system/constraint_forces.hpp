@@ -1,7 +1,5 @@
 #pragma once
 
-#include <algorithm>
-#include <cmath>
 #include <cstddef>
 #include <pendula/numeric/general_inverse.hpp>
 #include <pendula/numeric/linear_system.hpp>
@@ -124,5 +122,18 @@ class ConstraintForces {
   GeneralInverse softness_;
   std::size_t independent_ = 0;
 };
+
+/// Accelerations of a system in a state; constraints hold.
+inline void find_accelerations(const SystemModel& model, double time, const double* q, const double* v, double* found) {
+  SystemAt<1> here(model);
+  here.set_time(time);
+  here(&SystemFunctions::acceleration, q, v, found);
+  if (model.info().constraints.empty()) return;
+  ConstraintForces forces(model.info());
+  std::vector<double> lambda(forces.count());
+  forces.look(here, q);
+  forces.find(here, q, v, found, lambda.data());
+  forces.move(lambda.data(), found);
+}
 
 }  // namespace pendula

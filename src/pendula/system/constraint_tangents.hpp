@@ -5,6 +5,7 @@
 #include <pendula/numeric/directions.hpp>
 #include <pendula/system/constraint_forces.hpp>
 #include <pendula/system/parameter_slopes.hpp>
+#include <pendula/system/state_slopes.hpp>
 #include <pendula/system/system_model.hpp>
 #include <vector>
 
@@ -21,6 +22,7 @@ class ConstraintTangents {
         here_(model),
         forces_(model.info()),
         slopes_(model),
+        by_state_(model),
         q_(n_),
         v_(n_),
         pushed_(n_, n_),
@@ -92,9 +94,9 @@ class ConstraintTangents {
       }
       for (Eigen::Index j = 0; j < m_; ++j) inverse_(i, j) = forces_.inverse(row, static_cast<std::size_t>(j));
     }
-    Directions<> rates(m_, n_), p_D_q(n_, n_), p_D_v(n_, n_), f_D_q(n_, n_), f_D_v(n_, n_);
+    Directions<> p_D_q(n_, n_), p_D_v(n_, n_), f_D_q(n_, n_), f_D_v(n_, n_);
     Eigen::VectorXd p(n_), f(n_);
-    forces_.find_rates_by_place(here_, q_.data(), v_.data(), rates.data());
+    const Directions<> rates = by_state_.constraint_rates(time_, q_.data(), v_.data()).first.leftCols(n_);
     here_(&SystemFunctions::momentum_form_with_jacobians, q_.data(), v_.data(), p.data(), f.data(), p_D_q.data(),
           p_D_v.data(), f_D_q.data(), f_D_v.data());
     resisted_ = slope_.transpose() * inverse_;
@@ -109,6 +111,7 @@ class ConstraintTangents {
   SystemAt<1> here_;
   ConstraintForces forces_;
   ParameterSlopes slopes_;
+  StateSlopes by_state_;
   double time_ = 0;
   Eigen::VectorXd q_, v_, impulses_;
   Directions<> slope_, moved_, inverse_;  // G, G M⁻¹, K⁻¹

@@ -83,7 +83,7 @@ class Widths {
       compare(&Of::constraint_rates, {&q_, &v_}, {count, count});
       compare(&Of::constraint_rate_slopes, {&q_, &v_}, {count * n_});
       compare(&Of::constraints_along, {&parameters_, &q_}, {count, count * n_});
-      compare(&Of::constraint_rates_along, {&parameters_, &q_, &v_}, {count});
+      compare(&Of::constraint_rates_along, {&parameters_, &v_, &a_, &q_, &v_}, {count, count});
     }
     compare_iteration(1);
     for (const std::size_t width : widths) compare_iteration(width);

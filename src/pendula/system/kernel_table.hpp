@@ -235,13 +235,18 @@ class KernelFunctions : KernelNumbers<S, W> {
       }
     }
   }
-  static void constraint_rates_along(const Conditions& at, const double* varied_parameters, const double* q,
-                                     const double* v, double* dg_dot) {
+  static void constraint_rates_along(const Conditions& at, const double* varied_parameters, const double* dq,
+                                     const double* dv, const double* q, const double* v, double* dg_dot,
+                                     double* dg_ddot) {
     if constexpr (has_constraints<S>) {
       typename S::template Constraints<Dual<L>> first, second;
       S::constraint_rates(Crossing::template read_parameters<Dual<L>>(VariedRows{at.parameters, varied_parameters}, at),
-                          unvaried(q), unvaried(v), first, second);
-      for (Eigen::Index i = 0; i < first.rows(); ++i) store(first(i, 0).slope, dg_dot + i * W);
+                          Crossing::template read<Vector<Dual<L>>>(VariedRows{q, dq}),
+                          Crossing::template read<Vector<Dual<L>>>(VariedRows{v, dv}), first, second);
+      for (Eigen::Index i = 0; i < first.rows(); ++i) {
+        store(first(i, 0).slope, dg_dot + i * W);
+        store(second(i, 0).slope, dg_ddot + i * W);
+      }
     }
   }
 

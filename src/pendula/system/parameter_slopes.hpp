@@ -46,10 +46,12 @@ class ParameterSlopes {
     const auto count = static_cast<std::size_t>(p.rows()), constraints = static_cast<std::size_t>(g.rows());
     vary(time, q, v, 1, [&](auto take) {
       at_(&SystemFunctions::constraints_along, varied_[0], numbers_[0], found_[0], found_[2 * constraints]);
-      at_(&SystemFunctions::constraint_rates_along, varied_[0], numbers_[0], numbers_[count], found_[constraints]);
       take(g, found_, 0);
-      take(g_dot, found_, constraints);
       take(g_D_q, found_, 2 * constraints);
+      std::fill_n(numbers_[2 * count], 2 * count * width, 0.0);
+      at_(&SystemFunctions::constraint_rates_along, varied_[0], numbers_[2 * count], numbers_[3 * count], numbers_[0],
+          numbers_[count], found_[0], found_[constraints]);
+      take(g_dot, found_, 0);
     });
   }
 

@@ -74,9 +74,10 @@ struct SystemFunctions {
   void (*constraint_rates)(const Conditions&, Numbers q, Numbers v, double* g_dot, double* g_ddot);
   /// ∂(dg/dt)/∂q, where rates are the same.
   void (*constraint_rate_slopes)(const Conditions&, Numbers q, Numbers v, double* g_dot_D_q);
-  /// Derivatives of g and ∂g/∂q, and of dg/dt, along a variation of parameters.
+  /// Derivatives of g and ∂g/∂q along a variation of parameters; of what constraint_rates gives also along (dq, dv).
   void (*constraints_along)(const Conditions&, Numbers parameters, Numbers q, double* dg, double* dg_D_q);
-  void (*constraint_rates_along)(const Conditions&, Numbers parameters, Numbers q, Numbers v, double* dg_dot);
+  void (*constraint_rates_along)(const Conditions&, Numbers parameters, Numbers dq, Numbers dv, Numbers q, Numbers v,
+                                 double* dg_dot, double* dg_ddot);
   /// Orders of Taylor series, and how they change where parameters, inputs and states do: series_start, and one order k
   /// of series_next, whose `order` is (k, 1/k, unit/(k + 1), time), (4, W), and whose `sums` are Σ A_j B_(k−j),
   /// (SeriesInfo::sums, W); inputs are those of order k. Rows of `state`, `next` and `operands` are those of W motions.
@@ -127,6 +128,6 @@ const SystemFunctions& functions_of(const SystemTable& table) {
 }
 
 /// Version of the layout that crosses to a separately compiled kernel: SystemTable and everything that it points to.
-inline constexpr int system_interface = 18;
+inline constexpr int system_interface = 19;
 
 }  // namespace pendula

@@ -199,7 +199,7 @@ class Engine {
   pointsAt(q, time = this.time) {
     const v = new Float64Array(this.size);
     this.#write({ q, v });
-    this.#require(this.module.pendula_row(this.model, time, this.q, this.v, this.row) === 0);
+    this.#require(this.module.pendula_row(this.model, time, this.q, this.v, 0, this.row) === 0);
     return this.#read(this.row + 8 * (1 + 2 * this.size + this.inputs), this.pointCount);
   }
 
