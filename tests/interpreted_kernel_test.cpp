@@ -244,7 +244,7 @@ TEST(InterpretedKernel, TellsTheLineThatIsWrong) {
     return "nothing";
   };
   EXPECT_EQ(told(""), "line 0: expected a program, got ");
-  EXPECT_EQ(told(changed("program|18", "program|9")), "line 1: expected a whole number from 18 to 18, got 9");
+  EXPECT_EQ(told(changed("program|19", "program|9")), "line 1: expected a whole number from 19 to 19, got 9");
   EXPECT_EQ(told(changed("links|1", "links|one")), "line 4: expected a whole number from 1 to 1000000, got one");
   EXPECT_EQ(told(changed("kg|1|1.0|1|0", "kg|1|1.0|1")), "line 8: expected another word, got the end of the line");
   EXPECT_EQ(told(changed("bob|2|cart", "bob|2|cart|3")), "line 11: expected the end of the line, got 3");

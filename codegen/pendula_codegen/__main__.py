@@ -26,6 +26,7 @@ from pendula_codegen.export import (
     Values,
     render_export,
     require_free,
+    require_free_rates,
     require_size,
 )
 from pendula_codegen.feedback import SampledLaw, close_loops, sampled_laws, sampled_laws_of_chain
@@ -261,6 +262,7 @@ def _exported_chain(options: argparse.Namespace) -> Mapping[str, str | bytes]:
 
 def _exported_model(options: argparse.Namespace) -> Mapping[str, str | bytes]:
     model = _fed_model(options)
+    require_free_rates(model.constraints)
     if options.language != "fmu":
         require_free(model.constraints)
     wanted = _request(options, sampled_laws(model, options.sampled))

@@ -57,7 +57,13 @@ def describe(file: Path, links: int | None = None) -> dict[str, object]:
             for m in model.motions
         ],
         "constraints": [
-            {"name": each.name, "unit": each.unit, "remark": remark(each.name)} for each in model.constraints
+            {
+                "name": each.name,
+                "unit": each.unit,
+                "of": "rates" if each.of_rates else "positions",
+                "remark": remark(each.name),
+            }
+            for each in model.constraints
         ],
         "degrees_of_freedom": len(model.coordinates) - len(model.constraints),
         "switches": [{"value": switch.text, "remark": ""} for switch in model.switches],

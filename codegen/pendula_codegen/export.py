@@ -314,6 +314,16 @@ def _require_smooth(switches: Sequence[str]) -> None:
         )
 
 
+def require_free_rates(constraints: Sequence[Constraint]) -> None:
+    """Raises GenerationError for constraints of rates."""
+    names = ", ".join(each.name for each in constraints if each.of_rates)
+    if names:
+        raise GenerationError(
+            f"export: expected a model without constraints of rates, got one with {names}: what is exported cannot "
+            "keep them yet"
+        )
+
+
 def require_free(constraints: Sequence[Constraint]) -> None:
     """Raises GenerationError where there are some."""
     if constraints:

@@ -27,7 +27,7 @@ from typing import NoReturn
 
 import mpmath
 import sympy
-from sympy import Add, Expr, Integer, Symbol, expand, lambdify, sympify
+from sympy import Add, Expr, Integer, Symbol, expand, lambdify, simplify, sympify
 
 from pendula_codegen.errors import GenerationError
 from pendula_codegen.exact import exact
@@ -115,12 +115,13 @@ class Point:
 
 @dataclass(frozen=True)
 class Constraint:
-    """g(q, t) = 0, and the line of the model that said it."""
+    """g(q, t) = 0, or of rates: A(q, t) v + b(q, t) = 0; and the line of the model that said it."""
 
     name: str
     unit: str
     value: Expr
     where: str
+    of_rates: bool = False
 
 
 @dataclass(frozen=True)
@@ -281,26 +282,41 @@ class Model:
         self._forces.append((coordinate, self._said(value, "force")))
 
     def constraint(self, name: str, value: Expr, unit: str) -> None:
-        """What is 0 at all times: an expression of coordinates, motions, parameters and time. Forces keep it so.
+        """What is 0 at all times: an expression of coordinates, motions, parameters and time, that may be linear in
+        rates, too. Forces keep it so.
 
-        The force is the column force_<name>, J over the unit of the expression.
+        The force is the column force_<name>: J over the unit of the expression; W over it where that has rates.
         """
         self._declare(name, "a constraint")
         self._declare(f"force_{name}", f"the force of {name}")
         value = self._expression(value, f"constraint {name}")
-        rates = [rate for rate in self._rates() if value.has(rate)]
-        if rates:
-            self._fail(
-                f"constraint {name} holds '{rates[0]}', a rate: constraints of rates are not there yet; "
-                "expected coordinates, motions, parameters and time"
-            )
-        motions = (m.symbol for m in self.motions)
-        self._check(value, f"constraint {name}", (*self._positions(), *motions, self.time))
+        of_rates = bool(self._switches.behind(value) & {*self._rates()})
+        motions = [m.symbol for m in self.motions]
+        if of_rates:
+            motions += [m.rates[0] for m in self.motions]
+        known = (*self._positions(), *(self._rates() if of_rates else ()), *motions, self.time)
+        self._check(value, f"constraint {name}", known)
         if self._switches.held_by(value):
             self._fail(
                 f"constraint {name}: expected one smooth function, got one of several pieces: a bend in it is a blow"
             )
-        self.constraints.append(Constraint(name, self._text(unit, "a unit"), value, self._line()))
+        if of_rates:
+            value = self._linear_in_rates(name, value)
+        self.constraints.append(Constraint(name, self._text(unit, "a unit"), value, self._line(), of_rates))
+
+    def _linear_in_rates(self, name: str, value: Expr) -> Expr:
+        """The same as A v + b."""
+        rates = self._rates()
+        slopes = [value.diff(rate) for rate in rates]
+        for rate, slope in zip(rates, slopes, strict=True):
+            if any(simplify(slope.diff(other)) != 0 for other in rates if slope.has(other)):
+                self._fail(
+                    f"constraint {name}: expected an expression of positions, or one that is linear in rates, got "
+                    f"another function of {rate}"
+                )
+        still = dict.fromkeys(rates, Integer(0))
+        parts = [slope.xreplace(still) * rate for slope, rate in zip(slopes, rates, strict=True)]
+        return Add(*parts, value.xreplace(still))
 
     def point(self, name: str, components: Sequence[Expr], *, kind: str = "bob") -> Point:
         """A point for files and pictures: 2 or 3 components, m.
@@ -463,6 +479,11 @@ class Model:
             *(constraint.value for constraint in self.constraints),
         ]
 
+    def constraint_slopes(self, constraint: Constraint) -> list[Expr]:
+        """Of a constraint by coordinates, or of one of rates by these: forces are along them."""
+        by = self._rates() if constraint.of_rates else [c.symbol for c in self.coordinates]
+        return [constraint.value.diff(symbol) for symbol in by]
+
     def force_along(self, q: Symbol) -> Expr:
         """Generalised force along a coordinate that L does not give, as the file says it."""
         given = [said.value for along, said in self._forces if along == q]
@@ -514,7 +535,7 @@ class Model:
 
     def _check_constraints(self) -> None:
         """Refuses those that coordinates cannot meet, or that say again what others say."""
-        slopes = jacobian([each.value for each in self.constraints], [c.symbol for c in self.coordinates])
+        slopes = [self.constraint_slopes(each) for each in self.constraints]
         dependent = _dependent(slopes) if slopes else None
         for k, (constraint, row) in enumerate(zip(self.constraints, slopes, strict=True)):
             said = f"{constraint.where}: constraint {constraint.name}"
@@ -523,7 +544,7 @@ class Model:
                     f"{said}: expected 0 somewhere, got {constraint.value}, which is never 0"
                 )
             if not any(row):
-                raise GenerationError(f"{said}: expected one that some coordinate changes, got none")
+                raise GenerationError(f"{said}: expected one that some coordinate or rate changes, got none")
             if k == dependent:
                 others = ", ".join(each.name for each in self.constraints[:k])
                 raise GenerationError(

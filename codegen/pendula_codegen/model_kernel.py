@@ -5,7 +5,23 @@ from __future__ import annotations
 from collections.abc import Iterator, Set
 from functools import cached_property
 
-from sympy import Abs, Add, Expr, Function, Matrix, Mul, Pow, Rational, acos, asin, cos, log, sin, tan
+from sympy import (
+    Abs,
+    Add,
+    Expr,
+    Function,
+    Integer,
+    Matrix,
+    Mul,
+    Pow,
+    Rational,
+    acos,
+    asin,
+    cos,
+    log,
+    sin,
+    tan,
+)
 
 from pendula_codegen.entry_points import Declared, Output, Q, SystemKernel, V
 from pendula_codegen.entry_points import Function as EntryPoint
@@ -61,23 +77,34 @@ class ModelKernel(SystemKernel):
         if not self.model.constraints:
             return []
         system, given = self.system, self.model.constraints
-        values = [constraint.value for constraint in given]
-        slopes = self.jacobian(values, system.coordinates)
-        rates = self._changes(values)
+        values = [Integer(0) if constraint.of_rates else constraint.value for constraint in given]
+        slopes = Matrix([self.model.constraint_slopes(constraint) for constraint in given])
+        changes = self._changes(values)
+        rates = [
+            constraint.value if constraint.of_rates else change
+            for constraint, change in zip(given, changes, strict=True)
+        ]
         read, count = (self.parameters, Q, V), len(given)
 
         def numbers(name: str, value: list[Expr], meaning: str) -> Output:
             return Output(name, "constraints", Matrix(value), f"{meaning}, ({count})")
 
-        matrix = Output(
-            "g_D_q", "constraint_slopes", slopes, f"∂g_row/∂q_column, ({count} x {len(system.coordinates)})"
-        )
+        def matrix(name: str, value: Matrix, meaning: str) -> Output:
+            return Output(
+                name, "constraint_slopes", value, f"{meaning}, ({count} x {len(system.coordinates)})"
+            )
+
+        of_rates = any(constraint.of_rates for constraint in given)
+        more = "; of those of rates g is 0, and A v + b = 0 stands for dg/dt" if of_rates else ""
         return [
             EntryPoint(
                 "constraints",
-                "Constraints  g(q, t) = 0,  which forces (∂g/∂q)ᵀ λ keep",
+                f"Constraints  g(q, t) = 0,  which forces (∂g/∂q)ᵀ λ keep{more}",
                 read[:2],
-                (numbers("g", values, "constraints"), matrix),
+                (
+                    numbers("g", values, "constraints"),
+                    matrix("g_D_q", slopes, "∂g_row/∂q_column; A" if of_rates else "∂g_row/∂q_column"),
+                ),
             ),
             EntryPoint(
                 "constraint_rates",
@@ -87,6 +114,12 @@ class ModelKernel(SystemKernel):
                     numbers("g_dot", rates, "rates of the constraints"),
                     numbers("g_ddot", self._changes(rates), "second rates without accelerations"),
                 ),
+            ),
+            EntryPoint(
+                "constraint_rate_slopes",
+                "Derivatives of dg/dt by coordinates, where rates are the same",
+                read,
+                (matrix("g_dot_D_q", self.jacobian(rates, system.coordinates), "∂(dg/dt)_row/∂q_column"),),
             ),
         ]
 

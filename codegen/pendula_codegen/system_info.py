@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from sympy import Expr, Symbol, expand, pi
+from sympy import Expr, Integer, Symbol, expand, pi
 
 from pendula_codegen.entry_points import SystemKernel
 from pendula_codegen.model import Model
@@ -34,7 +34,7 @@ def info_lines(kernel: ModelKernel, tapes: SeriesTapes) -> list[str]:
     rows += [("connection", each.kind, *each.ends) for each in model.connections]
     rows += [("argument", is_base) for _, is_base in kernel.call_arguments]
     rows += [("switch", switch.text) for switch in model.switches]
-    rows += [("constraint", each.name, each.unit) for each in model.constraints]
+    rows += [("constraint", each.name, each.unit, each.of_rates) for each in model.constraints]
     series = tapes.series
     rows.append(("series", series.has_momenta, len(series.sums), len(series.operands), tapes.kept))
     rows += [("sum", *pair) for pair in series.places]
@@ -57,5 +57,9 @@ def has_constant_masses(kernel: SystemKernel) -> bool:
 
 
 def depends_on_time(model: Model) -> bool:
+    """Or whether something else that is there at rest may bring energy: what constraints of rates hold besides A v."""
+    still = dict.fromkeys(model.system.velocities, Integer(0))
+    if any(each.of_rates and each.value.xreplace(still) != 0 for each in model.constraints):
+        return True
     held = [*model.held_expressions(), *(c for p in model.points for c in p.components)]
     return any(expression.has(model.time) for expression in held)

@@ -31,6 +31,7 @@ OF_MANY = (
     "call_arguments",
     "constraints",
     "constraint_rates",
+    "constraint_rate_slopes",
     "constraints_along",
     "constraint_rates_along",
     "series_start_along",

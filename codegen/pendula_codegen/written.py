@@ -46,6 +46,7 @@ class Written:
     constraints_q: list[Expr]
     constraint_rates: list[Expr]
     constraint_second_rates: list[Expr]
+    constraint_rates_q: list[Expr]
 
 
 def written(model: Model) -> Written:
@@ -72,7 +73,12 @@ def written(model: Model) -> Written:
         for momentum, change, force in zip(p, slope, f, strict=True)
     ]
     points = [component for point in model.points for component in point.components]
-    constraints = [constraint.value for constraint in model.constraints]
+    given = model.constraints
+    constraints = [Integer(0) if each.of_rates else each.value for each in given]
+    rates = [
+        each.value if each.of_rates else change
+        for each, change in zip(given, changes(constraints), strict=True)
+    ]
 
     still = {rate: Integer(0) for rate in v}
     return Written(
@@ -96,9 +102,10 @@ def written(model: Model) -> Written:
         momenta_at_rest=[momentum.xreplace(still) for momentum in p],
         residual_at_rest=[Add(change, -force) for change, force in zip(slope, f, strict=True)],
         constraints=constraints,
-        constraints_q=_jacobian(constraints, q),
-        constraint_rates=changes(constraints),
-        constraint_second_rates=changes(changes(constraints)),
+        constraints_q=_jacobian(rates, v),
+        constraint_rates=rates,
+        constraint_second_rates=changes(rates),
+        constraint_rates_q=_jacobian(rates, q),
     )
 
 

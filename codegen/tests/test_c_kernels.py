@@ -53,6 +53,7 @@ def define(model, links):
     model.point("r", (x + sin(theta), y, cos(theta) * t))
     model.constraint("tied", x**2 + a * sqrt(2 + y**2) - sin(theta + t), "m^2")
     model.constraint("turned", theta * t - b * y, "rad")
+    model.constraint("rolled", y * model.rate(x) - sin(a * x + t) * model.rate(theta) + b * x * cos(y), "m^2/s")
 """
 # Functions of several pieces, one in another, and one whose pieces have no values elsewhere.
 PIECES = """
@@ -209,6 +210,8 @@ class Truth:
                     "g_dot": said("constraint_rates", at),
                     "g_ddot": said("constraint_second_rates", at),
                 }
+            case "constraint_rate_slopes":
+                return {"g_dot_D_q": said("constraint_rates_q", at)}
             case "constraints_along" | "constraint_rates_along":
                 moved = {"parameters": "d_parameters"}
                 if function == "constraint_rates_along":
@@ -430,8 +433,9 @@ def test_what_a_kernel_says_of_itself(everything):
         "point\tp\t2\tbob",
         "point\tr\t3\tbob",
         *(line for line in lines if line.startswith("argument\t")),
-        "constraint\ttied\tm^2",
-        "constraint\tturned\trad",
+        "constraint\ttied\tm^2\t0",
+        "constraint\tturned\trad\t0",
+        "constraint\trolled\tm^2/s\t1",
         f"series\t1\t61\t77\t{loaded.table.series.kept}",
         *(f"sum\t{first}\t{second}" for first, second in loaded.table.series.series.places),
     ]

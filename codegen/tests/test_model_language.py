@@ -54,12 +54,18 @@ REFUSED = {
     "model.spring('origin', (x, y))": "spring: expected a point that the model has by now, one of origin; got (x, y)",
     "model.spring(model.point('bob', (x, y)), 'bob')": "spring: expected two different points, got bob twice",
     "model.constraint('tie', x - push, 'm')": "constraint tie holds 'push', an input, which may not stand in it",
-    "model.constraint('tie', x * model.rate(y), 'm')": "tie holds 'y_dot', a rate: constraints of rates are not there",
+    "model.constraint('tie', x * model.rate(y) ** 2, 'm')": "expected an expression of positions, or one that is linear",
+    "model.constraint('tie', sin(model.rate(y)), 'm/s')": "linear in rates, got another function of y_dot",
+    "model.constraint('tie', model.rate(x) - push, 'm/s')": "constraint tie holds 'push', an input, which may not",
+    "model.constraint('tie', Abs(x) * model.rate(x), 'm/s')": "constraint tie: expected one smooth function, got one",
+    "model.constraint('one', x - y, 'm'), model.constraint('two', model.rate(x) - model.rate(y), 'm/s')": (
+        "constraint two: expected one that others do not contain, got what one fix already"
+    ),
     "model.constraint('tie', x + Symbol('z'), 'm')": "tie holds the symbol 'z', which the model does not declare",
     "model.constraint('tie', Abs(x) - y, 'm')": "constraint tie: expected one smooth function, got one of several",
     "model.constraint('tie', Integer(2), 'm')": "constraint tie: expected 0 somewhere, got 2, which is never 0",
-    "model.constraint('tie', m - t, 'm')": "constraint tie: expected one that some coordinate changes, got none",
-    "model.constraint('tie', sin(x)**2 + cos(x)**2 - 2, 'm')": "tie: expected one that some coordinate changes",
+    "model.constraint('tie', m - t, 'm')": "constraint tie: expected one that some coordinate or rate changes",
+    "model.constraint('tie', sin(x)**2 + cos(x)**2 - 2, 'm')": "tie: expected one that some coordinate or rate",
     "model.constraint('tie', x, 'm'), model.constraint('tie', y, 'm')": "expected a new name, got 'tie', which is a",
     "model.constraint('x', x, 'm')": "expected a new name, got 'x', which is a coordinate already",
     "model.constraint('one', x * y - 1, 'm'), model.constraint('two', 2 - 2 * x * y, 'm')": (

@@ -255,6 +255,7 @@ def functions_of(model: Model) -> list[tuple[str, Program, list[Expr]]]:
             "g_D_q": said.constraints_q,
             "g_dot": said.constraint_rates,
             "g_ddot": said.constraint_second_rates,
+            "g_dot_D_q": said.constraint_rates_q,
         },
     }
     # Two functions give a g.

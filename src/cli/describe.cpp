@@ -92,8 +92,8 @@ void print_model(const Json& model) {
   print_list(model, "motions", {"motion", "unit", "without drives"}, [](const Json& each) {
     return TableRow{text(each, "name"), text(each, "unit"), shortest(each["default"].get<double>())};
   });
-  print_list(model, "constraints", {"constraint", "unit"}, [](const Json& each) {
-    return TableRow{text(each, "name"), text(each, "unit")};
+  print_list(model, "constraints", {"constraint", "unit", "of"}, [](const Json& each) {
+    return TableRow{text(each, "name"), text(each, "unit"), text(each, "of")};
   });
   print_list(model, "switches", {"steps end where it is 0"},
              [](const Json& each) { return TableRow{text(each, "value")}; });
@@ -102,7 +102,8 @@ void print_model(const Json& model) {
   });
   if (!model["constraints"].empty()) {
     std::cout << '\n'
-              << "degrees of freedom: " << model["degrees_of_freedom"] << ", if no constraint follows from others\n";
+              << "degrees of freedom: " << model["degrees_of_freedom"]
+              << " of rates, if no constraint follows from others\n";
   }
   std::cout << '\n' << "file  " << text(model, "file") << '\n';
   if (model["has_links"]) std::cout << "links " << model["links"] << "; --links N tells it of N\n";

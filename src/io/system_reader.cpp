@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <functional>
 #include <numbers>
 #include <pendula/numeric/number_text.hpp>
 #include <pendula/run/assembly.hpp>
@@ -232,7 +233,8 @@ void put_together(const StartTable& table, const SystemSubject& system, SystemSc
     throw InputError(table.where(), "start", "coordinates and rates that keep the constraints",
                      left + " left over; from other guesses of what is found (assemble) it may close");
   }
-  for (std::size_t k = 0; k < info.coordinates.size(); ++k) {
+  const bool finds_places = !std::ranges::all_of(info.constraint_is_of_rates, std::identity());
+  for (std::size_t k = 0; k < info.coordinates.size() && finds_places; ++k) {
     if (!free.coordinates[k]) continue;
     scenario.assembled.emplace_back(info.coordinates[k], start.q[static_cast<Eigen::Index>(k)]);
     scenario.guesses.emplace_back(info.coordinates[k], guess[static_cast<Eigen::Index>(k)]);

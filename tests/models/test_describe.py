@@ -58,6 +58,7 @@ def test_examples_set_nothing_else(pendula):
     models = {model["model"]: model for model in json.loads(pendula("models", "--json").stdout)}
     scenarios = [tomllib.loads(file.read_text()) for file in EXAMPLES.glob("*.toml")]
     scenarios = [scenario for scenario in scenarios if "system" in scenario]
+    scenarios = [scenario for scenario in scenarios if not scenario["system"]["model"].endswith(".py")]
     assert {scenario["system"]["model"] for scenario in scenarios} == set(models)
     for scenario in scenarios:
         told = models[scenario["system"]["model"]]
@@ -112,8 +113,8 @@ def test_what_is_wrong_is_told(pendula, tmp_path, arguments, expected):
 def test_a_linkage(pendula):
     lines = pendula("describe", "four_bar").stdout.splitlines()
     for line in [
-        "constraint  unit",
-        "loop_x      m",
-        "degrees of freedom: 1, if no constraint follows from others",
+        "constraint  unit  of",
+        "loop_x      m     positions",
+        "degrees of freedom: 1 of rates, if no constraint follows from others",
     ]:
         assert line in lines

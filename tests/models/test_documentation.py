@@ -16,12 +16,13 @@ def blocks(language: str) -> list[str]:
 
 @pytest.fixture
 def folder(tmp_path):
-    sprung, lame, rope, load, bars = blocks("python")
+    sprung, lame, rope, load, bars, disc = blocks("python")
     (tmp_path / "sprung.py").write_text(sprung)
     (tmp_path / "lame.py").write_text(lame)
     (tmp_path / "rope.py").write_text(rope)
     (tmp_path / "load.py").write_text(load)
     (tmp_path / "bars.py").write_text(bars)
+    (tmp_path / "disc.py").write_text(disc)
     (tmp_path / "sprung.toml").write_text(blocks("toml")[0])
     return tmp_path
 
@@ -65,6 +66,18 @@ def test_a_linkage(folder, pendula):
     run = json.loads(ended.stdout)
     assert run["degrees_of_freedom"] == 1
     assert max(run["constraint_error"].values()) < 1e-13  # measured 3.2e-14
+
+
+def test_a_disc_that_rolls(folder, pendula):
+    (folder / "disc.toml").write_text(
+        '[system]\nmodel = "disc.py"\n[start]\nphi_dot = 0.5\ntheta_dot = 2.0\n[run]\nduration = 5.0\n'
+    )
+    ended = pendula("simulate", "disc.toml", "--json", cwd=folder)
+    assert ended.returncode == 0, ended.stderr
+    run = json.loads(ended.stdout)
+    x, y = run["final"]["q"]["x"], run["final"]["q"]["y"]
+    assert abs(x**2 + (y - 2.0) ** 2 - 4.0) < 1e-8  # a circle, its radius 0.5 * 2.0 / 0.5
+    assert run["degrees_of_freedom"] == 2
 
 
 def test_the_program_compiles_and_ends_where_the_scenario_does(folder, pendula, environment):

@@ -5,7 +5,7 @@
 namespace pendula::test {
 
 // A mass m on a spring k with a force u, as the generator writes it, with bars in place of tabs.
-inline constexpr std::string_view spring = R"(program|18
+inline constexpr std::string_view spring = R"(program|19
 name|spring
 model|spring
 links|1

@@ -10,7 +10,7 @@ from pendula_codegen.linear_solve import UNROLLED
 from pendula_codegen.table import CONDITIONS, KernelTable, TableFunction
 from pendula_codegen.tape import Row, Step, Tape, Value
 
-INTERFACE = 18  # system_interface of pendula/system/system_table.hpp
+INTERFACE = 19  # system_interface of pendula/system/system_table.hpp
 # Functions of one argument that are called for one number at a time.
 CALLS = {"acos", "asin", "atan", "cbrt", "cosh", "sinh", "sqrt", "tan", "tanh"}
 # Functions that steps do not call for these numbers of states: they are compiled for eight only, and others use those.

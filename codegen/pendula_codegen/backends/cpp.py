@@ -417,6 +417,7 @@ def constants(
         members += [
             ("std::string_view", "constraint_names", [each.name for each in constraints]),
             ("std::string_view", "constraint_units", [each.unit for each in constraints]),
+            ("bool", "constraint_is_of_rates", [each.of_rates for each in constraints]),
         ]
     lines = []
     for element, name, values in members:

@@ -56,7 +56,7 @@ class LagrangianNewton {
       for (std::size_t k = 0; k < system_.stages(); ++k) {
         const L hb(stages.columns().hb(k));
         for (std::size_t column = 0; column < count; ++column) {
-          system_.set_derivative(count + i, column, k, hb * constraints.lacking_by(i, column, k));
+          system_.set_derivative(count + i, column, k, hb * constraints.lacking_by(stages.columns(), i, column, k));
           system_.set_derivative(column, count + i, k, L(0.0) - constraints.pushed_by(column, i, k));
         }
         for (std::size_t j = 0; j < constraints.count(); ++j) {

@@ -115,7 +115,10 @@ class LagrangianSolver : public StageIterations<LagrangianStages<Width, Form>> {
 
   /// The derivative of the step that was solved and not yet accepted.
   using Tangent = LagrangianTangent<Width>;
-  Tangent make_tangent() const requires Form::is_symplectic { return Tangent(stages_); }
+  Tangent make_tangent() const requires Form::is_symplectic {
+    require_no_constraints_of_rates(stages_.info(), "derivatives of steps: expected constraints of positions only");
+    return Tangent(stages_);
+  }
   void linearize(Tangent& tangent) {
     if (stages_.is_constrained()) {
       complete();

@@ -368,9 +368,9 @@ class LagrangianStages : public SystemMotion<StagesInLanes<Eigen::Dynamic, doubl
   void follow_constraints(bool with_derivatives) {
     if (!constraints_) return;
     if (with_derivatives) {
-      constraints_->linearize(state_.data(), U_.front().numbers());
+      constraints_->linearize(way());
     } else {
-      constraints_->follow(state_.data(), U_.front().numbers());
+      constraints_->follow(way());
     }
   }
   /// The residual of the momentum of a coordinate without what constraints push, and its derivative by an increment of
@@ -427,13 +427,17 @@ class LagrangianStages : public SystemMotion<StagesInLanes<Eigen::Dynamic, doubl
 
   void prepare_constraints(double ratio, const StagePrediction<double>& from) {
     find_rates(time_);
-    constraints_->prepare(time_, h(), room(0), weights_.data());
+    constraints_->prepare(time_, h(), room(0), room(2), weights_.data());
     if (from.cold) {
       push_as_at_start();
     } else {
       constraints_->predict(from.again ? 0 : 1, ratio);
     }
-    constraints_->set_out(state_.data(), U_.front().numbers());
+    constraints_->set_out(way());
+  }
+
+  typename StageConstraints<Width>::Way way() const {
+    return {state_.data(), U_.front().numbers(), columns_, at_stages()};
   }
 
   void push_as_at_start() {
@@ -451,7 +455,7 @@ class LagrangianStages : public SystemMotion<StagesInLanes<Eigen::Dynamic, doubl
                 Base::call(0, 3));
     const IterationChange found =
         detail::replace_increments<Width>(on.hb, Base::call(0, 2), on.weights, 2 * count_, on.increments);
-    constraints_->correct(on.start, on.increments);
+    constraints_->correct(way());
     size_ = std::max(found.size, floor());
     return found.change == 0 ? 0 : found.change / size_;
   }

@@ -196,7 +196,8 @@ class LagrangianTangent {
       for (std::size_t k = 0; k < system_.stages(); ++k) {
         const Eigen::Index impulse = system_.at(count() + i, k);
         for (std::size_t row = 0; row < count(); ++row) {
-          set_derivatives(count() + i, system_.at(row, k), L(columns_.hb(k)) * constraints_->lacking_by(i, row, k));
+          set_derivatives(count() + i, system_.at(row, k),
+                          L(columns_.hb(k)) * constraints_->lacking_by(columns_, i, row, k));
           set_derivatives(row, impulse, L(0.0) - constraints_->pushed_by(row, i, k));
           of_residuals_(impulse, eigen_count() + index(row)) = -constraints_->slope(k, i, row);
         }

@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <limits>
 #include <pendula/gauss/lobatto_nodes.hpp>
+#include <pendula/gauss/stage_layout.hpp>
 #include <pendula/numeric/compensated.hpp>
 #include <pendula/numeric/general_inverse.hpp>
 #include <pendula/numeric/pack_rows.hpp>
@@ -21,6 +22,10 @@ namespace pendula {
 
 /// Constraints of a system in a step of a Gauss method: they hold at Lobatto nodes (LobattoNodes), by impulses there.
 /// Of the last node, the impulse makes rates keep the constraints, too.
+///
+/// Constraints of rates, A v + b = 0, hold at the stages. What they lack is told as if they were of positions: as its
+/// integral up to the Lobatto nodes, Σ_j r_kj h b_j (A V_j + b), which vanishes at all of them where it does at all
+/// stages. If A v + b is the rate of a function that is linear in coordinates, these are the values of that function.
 template <int Width>
 class StageConstraints {
   static constexpr auto width = static_cast<std::size_t>(Width);
@@ -28,6 +33,14 @@ class StageConstraints {
 
  public:
   using L = typename LobattoNodes<Width>::L;
+  using Columns = typename StagesInLanes<Eigen::Dynamic, double, Width>::Columns;
+  /// Where increments (2 coordinates) lead from the start of a step.
+  struct Way {
+    const Compensated<double>* start;
+    const double* increments;
+    const Columns& columns;
+    const SystemAt<Width>& stages;
+  };
 
   StageConstraints(const SystemModel& model, int stages)
       : nodes_(stages),
@@ -46,6 +59,8 @@ class StageConstraints {
         values_(count_),
         slopes_(count_ * coordinates_),
         rates_(2 * count_),
+        by_place_(count_ * coordinates_),
+        at_rest_(count_ * coordinates_),
         first_(count_),
         last_(count_),
         end_push_(coordinates_),
@@ -55,7 +70,13 @@ class StageConstraints {
         moved_(lacking_.size() * coordinates_),
         inverse_(lacking_.size() * lacking_.size()),
         masses_(static_cast<Eigen::Index>(coordinates_)),
-        responses_(static_cast<Eigen::Index>(lacking_.size())) {}
+        responses_(static_cast<Eigen::Index>(lacking_.size())) {
+    for (const bool is_of_rates : model.info().constraint_is_of_rates) of_rates_ = of_rates_ || is_of_rates;
+    if (!of_rates_) return;
+    for (Rows* rows : {&stage_places_, &stage_rates_}) *rows = Rows(coordinates_);
+    for (Rows* rows : {&stage_values_, &stage_second_}) *rows = Rows(count_);
+    for (Rows* rows : {&stage_slopes_, &stage_by_place_}) *rows = Rows(count_ * coordinates_);
+  }
 
   std::size_t count() const { return count_; }
   /// How many do not follow from others, where it looked last.
@@ -69,14 +90,14 @@ class StageConstraints {
     start_.move(first_.data(), a);
   }
 
-  /// A step of h begins at q. Changes of coordinates are weighed.
-  void prepare(double time, double h, const double* q, const double* weights) {
+  /// A step of h begins at q, v. Changes of coordinates are weighed.
+  void prepare(double time, double h, const double* q, const double* v, const double* weights) {
     time_ = time;
     h_ = h;
     here_.set_time(time);
     start_.look(here_, q);
     std::copy_n(q, coordinates_, start_place_.begin());
-    find_rounding(q, weights);
+    find_rounding(q, v, weights);
     at_nodes_.set_times([&](std::size_t k) { return time + h * nodes_.d(std::min(k + 1, nodes_.stages())); });
   }
 
@@ -94,8 +115,8 @@ class StageConstraints {
     for (std::size_t i = 0; i < count_; ++i) nodes_.predicted(impulses_[i]).store(impulses_[i]);
   }
   /// Finds what these push on the way that increments are predicted to lead  (2 coordinates).
-  void set_out(const Compensated<double>* start, const double* increments) {
-    look(start, increments);
+  void set_out(const Way& way) {
+    look(way);
     push();
     find_inverse();
   }
@@ -105,8 +126,8 @@ class StageConstraints {
   L as_increments(std::size_t k) const { return nodes_.as_increments(pushes_[k]); }
 
   /// Corrects the impulses by what constraints lack where increments lead to.
-  void correct(const Compensated<double>* start, const double* increments) {
-    look(start, increments);
+  void correct(const Way& way) {
+    look(way);
     const std::size_t all = count_ * nodes_.stages();
     for (std::size_t k = 0; k < nodes_.stages(); ++k) {
       for (std::size_t i = 0; i < count_; ++i) lacking_[k * count_ + i] = values_[i][k] / h_;
@@ -125,18 +146,20 @@ class StageConstraints {
   // --- For Newton ---
 
   /// Looks at constraints where increments lead.
-  void follow(const Compensated<double>* start, const double* increments) {
-    look(start, increments);
+  void follow(const Way& way) {
+    look(way);
     push();
   }
   /// The same, with what the following derivatives need.
-  void linearize(const Compensated<double>* start, const double* increments) {
-    follow(start, increments);
+  void linearize(const Way& way) {
+    follow(way);
     find_curvature();
+    if (of_rates_) find_slopes_at_stages(way);
   }
   /// What constraint i lacks at the nodes 1 … s, and its derivative by an increment of coordinate k at stage j.
   L lacking(std::size_t i) const { return fma(L(softness(i)), L::load(impulses_[i]), L::load(values_[i])); }
-  L lacking_by(std::size_t i, std::size_t k, std::size_t j) const {
+  L lacking_by(const Columns& columns, std::size_t i, std::size_t k, std::size_t j) const {
+    if (is_of_rates(i)) return lacking_by_rates(columns, i * coordinates_ + k, j);
     return L::load(slopes_[i * coordinates_ + k]) * nodes_.reach(j);
   }
   /// The derivative of pushed(k) by the impulse of constraint i at node m.
@@ -258,7 +281,8 @@ class StageConstraints {
     start_.stop(here_, q, v, first_.data());
     for (std::size_t i = 0; i < count_; ++i) {
       double speed = at_rest * size(i, q);
-      for (std::size_t k = 0; k < coordinates_; ++k) speed += std::abs(start_.slope(i, k) * v[k]);
+      const double fastest = is_of_rates(i) ? at_rest * fastest_of(v) : 0;
+      for (std::size_t k = 0; k < coordinates_; ++k) speed += std::abs(start_.slope(i, k)) * (std::abs(v[k]) + fastest);
       require(i, "0", start_.value(i), size(i, q));
       require(i, "a rate of 0", start_.rate(i), speed);
     }
@@ -279,16 +303,55 @@ class StageConstraints {
     return start.value + (start.compensation + (total(increments) + more));
   }
 
-  // Coordinates and constraints at the nodes.
-  void look(const Compensated<double>* start, const double* increments) {
-    for (std::size_t k = 0; k < coordinates_; ++k) {
-      (L(start[k].value) + nodes_.reached(increments + k * width, L(start[k].compensation))).store(places_[k]);
-    }
-    at_nodes_(&SystemFunctions::constraints, places_[0], values_[0], slopes_[0]);
+  double fastest_of(const double* v) const {
+    double most = 0;
+    for (std::size_t k = 0; k < coordinates_; ++k) most = std::max(most, std::abs(v[k]));
+    return most;
   }
 
-  void find_rounding(const double* q, const double* weights) {
-    for (std::size_t i = 0; i < count_; ++i) first_[i] = size(i, q);
+  bool is_of_rates(std::size_t i) const { return of_rates_ && at_nodes_.model().info().constraint_is_of_rates[i]; }
+
+  // Coordinates and constraints at the nodes.
+  void look(const Way& way) {
+    for (std::size_t k = 0; k < coordinates_; ++k) {
+      const Compensated<double>& start = way.start[k];
+      (L(start.value) + nodes_.reached(way.increments + k * width, L(start.compensation))).store(places_[k]);
+    }
+    at_nodes_(&SystemFunctions::constraints, places_[0], values_[0], slopes_[0]);
+    if (of_rates_) look_at_stages(way);
+  }
+
+  // What constraints of rates lack.
+  void look_at_stages(const Way& way) {
+    for (std::size_t k = 0; k < coordinates_; ++k) {
+      const double* const moved = way.increments + k * width;
+      const Compensated<double>& start = way.start[k];
+      (L(start.value) + way.columns.integral(moved, L(start.compensation))).store(stage_places_[k]);
+      for (std::size_t j = 0; j < nodes_.stages(); ++j) stage_rates_[k][j] = moved[j] / way.columns.hb(j);
+    }
+    way.stages(&SystemFunctions::constraint_rates, stage_places_[0], stage_rates_[0], stage_values_[0],
+               stage_second_[0]);
+    for (std::size_t i = 0; i < count_; ++i) {
+      if (!is_of_rates(i)) continue;
+      for (std::size_t j = 0; j < nodes_.stages(); ++j) stage_values_[i][j] *= way.columns.hb(j);
+      nodes_.reached(stage_values_[i], L(0.0)).store(values_[i]);
+    }
+  }
+  void find_slopes_at_stages(const Way& way) {
+    way.stages(&SystemFunctions::constraints, stage_places_[0], stage_second_[0], stage_slopes_[0]);
+    way.stages(&SystemFunctions::constraint_rate_slopes, stage_places_[0], stage_rates_[0], stage_by_place_[0]);
+  }
+  L lacking_by_rates(const Columns& columns, std::size_t at, std::size_t j) const {
+    alignas(pack_alignment) double numbers[width] = {};
+    for (std::size_t n = 0; n < nodes_.stages(); ++n) {
+      numbers[n] = columns.hb(n) * stage_by_place_[at][n] * columns.m(n, j);
+    }
+    numbers[j] += stage_slopes_[at][j];
+    return nodes_.reached(numbers, L(0.0));
+  }
+
+  void find_rounding(const double* q, const double* v, const double* weights) {
+    for (std::size_t i = 0; i < count_; ++i) first_[i] = is_of_rates(i) ? way_of(i, v) : size(i, q);
     rounding_ = 0;
     double most = 0;
     for (std::size_t k = 0; k < coordinates_; ++k) {
@@ -310,6 +373,12 @@ class StageConstraints {
     double sum = 0;
     for (std::size_t k = 0; k < coordinates_; ++k) sum += std::abs(start_.slope(which, k)) * size_of(q, k);
     return sum;
+  }
+  // What goes by in a step of a constraint of rates.
+  double way_of(std::size_t which, const double* v) const {
+    double sum = 0;
+    for (std::size_t k = 0; k < coordinates_; ++k) sum += std::abs(start_.slope(which, k) * v[k]);
+    return std::abs(h_) * sum;
   }
   double size_of(const double* q, std::size_t k) const {
     return std::max(std::abs(q[k]), at_nodes_.model().info().is_angle[k] ? 1.0 : 0.0);
@@ -347,14 +416,44 @@ class StageConstraints {
     responses_.find(inverse_.data());
   }
 
-  // Σ_i J_i ∂²g_i/∂q_k ∂q_l at the nodes 1 … s − 1.
+  // Σ_i J_i ∂G_ik/∂q_l at the nodes 1 … s − 1: dg/dt is linear in rates.
   void find_curvature() {
-    take_second_derivatives(
-        coordinates_, [&](std::size_t k, std::size_t l) { return curved(k, l); },
-        [&](std::size_t k, std::size_t l, const L& second) { second.store(curvature_[k * coordinates_ + l]); });
+    if (!of_rates_) return find_second_derivatives();
+    for (std::size_t k = 0; k < coordinates_; ++k) std::fill_n(moving_[k], width, 0.0);
+    at_nodes_(&SystemFunctions::constraint_rate_slopes, places_[0], moving_[0], at_rest_[0]);
+    for (std::size_t k = 0; k < coordinates_; ++k) {
+      std::fill_n(moving_[k], width, 1.0);
+      at_nodes_(&SystemFunctions::constraint_rate_slopes, places_[0], moving_[0], by_place_[0]);
+      std::fill_n(moving_[k], width, 0.0);
+      for (std::size_t l = 0; l < coordinates_; ++l) {
+        double* const curved = curvature_[k * coordinates_ + l];
+        std::fill_n(curved, width, 0.0);
+        for (std::size_t i = 0; i < count_; ++i) {
+          const std::size_t at = i * coordinates_ + l;
+          for (std::size_t m = 1; m < nodes_.stages(); ++m) {
+            curved[m - 1] += impulses_[i][m] * (by_place_[at][m - 1] - at_rest_[at][m - 1]);
+          }
+        }
+      }
+    }
   }
-  // Σ_i J_i d²g_i/dt² there, where only the coordinates k and l move, at a rate of 1; of 2, where they are the same.
-  L curved(std::size_t k, std::size_t l) {
+
+  // The same of constraints of positions alone, from second rates: where only the coordinates k and l move, at a rate
+  // of 1; of 2, where they are the same; n stands for none. (find_curvature differs by rounding: with it, Newton took a
+  // sixth fewer iterations for a hanging chain; but steps of linkages would be others than they were.)
+  void find_second_derivatives() {
+    const std::size_t n = coordinates_;
+    const L none = second_rate(n, n);
+    for (std::size_t k = 0; k < n; ++k) {
+      const L of_k = second_rate(k, n);
+      for (std::size_t l = 0; l <= k; ++l) {
+        const L found = L(0.5) * ((second_rate(k, l) - of_k) + (none - second_rate(l, n)));
+        found.store(curvature_[k * n + l]);
+        if (l != k) found.store(curvature_[l * n + k]);
+      }
+    }
+  }
+  L second_rate(std::size_t k, std::size_t l) {
     for (std::size_t i = 0; i < coordinates_; ++i) {
       std::fill_n(moving_[i], width, (i == k ? 1.0 : 0.0) + (i == l ? 1.0 : 0.0));
     }
@@ -407,6 +506,9 @@ class StageConstraints {
   Rows places_, still_, moving_;  // at the nodes 1 … s
   Rows curvature_;                // there, of what impulses push
   Rows values_, slopes_, rates_;  // of the constraints there
+  Rows by_place_, at_rest_;       // ∂(dg/dt)/∂q
+  bool of_rates_ = false;         // whether some are
+  Rows stage_places_, stage_rates_, stage_values_, stage_second_, stage_slopes_, stage_by_place_;  // at the stages
   std::vector<double> first_, last_, end_push_, room_, start_place_;
   std::vector<double> lacking_, moved_, inverse_;
   LinearSystem masses_;

@@ -36,7 +36,7 @@ class Assembly {
     look(start_.q);
     double left = lacking();
     for (int correction = 0; correction < most && left > rounding; ++correction) {
-      put(free, least(chosen(slopes_, free), -values_), change);
+      put(free, least(chosen(slopes_of_positions(), free), -values_), change);
       const double shorter = std::max(1.0, largest_turn(change) / farthest);
       change /= shorter;
       const Eigen::VectorXd before = start_.q;
@@ -117,7 +117,10 @@ class Assembly {
     start_.v += change;
     const Eigen::VectorXd left = rates_of(start_.v);
     for (Eigen::Index i = 0; i < left.size(); ++i) {
-      const double size = slopes_.row(i).transpose().cwiseProduct(start_.v).cwiseAbs().sum() + at_rest * size_of(i);
+      double size = slopes_.row(i).transpose().cwiseProduct(start_.v).cwiseAbs().sum() + at_rest * size_of(i);
+      if (info_.constraint_is_of_rates[static_cast<std::size_t>(i)]) {
+        size += at_rest * slopes_.row(i).cwiseAbs().sum() * start_.v.cwiseAbs().maxCoeff();
+      }
       if (!(std::abs(left[i]) <= enough * size) && left[i] != 0) return left_over("rate of ", left);
     }
     return "";
@@ -143,6 +146,14 @@ class Assembly {
 
   void look(const Eigen::VectorXd& q) {
     here_(&SystemFunctions::constraints, q.data(), values_.data(), slopes_.data());
+  }
+  /// Constraints of rates leave places as they are.
+  Matrix slopes_of_positions() const {
+    Matrix slopes = slopes_;
+    for (Eigen::Index i = 0; i < slopes.rows(); ++i) {
+      if (info_.constraint_is_of_rates[static_cast<std::size_t>(i)]) slopes.row(i).setZero();
+    }
+    return slopes;
   }
   Eigen::VectorXd rates_of(const Eigen::VectorXd& v) {
     Eigen::VectorXd rates(values_.size());
@@ -216,8 +227,11 @@ class Assembly {
     std::string text;
     for (Eigen::Index i = 0; i < left.size(); ++i) {
       const auto k = static_cast<std::size_t>(i);
+      const bool is_of_rates = info_.constraint_is_of_rates[k];
+      if (is_of_rates && what.empty()) continue;  // places do not matter to it
       text += (text.empty() ? "" : ", ") + rounded(left[i], 3) + " " + std::string(info_.constraint_units[k]) +
-              (what.empty() ? "" : "/s") + " in the " + what + std::string(info_.constraints[k]);
+              (what.empty() || is_of_rates ? "" : "/s") + " in the " + (is_of_rates ? "" : what) +
+              std::string(info_.constraints[k]);
     }
     return text;
   }

@@ -10,6 +10,7 @@
 #include <pendula/run/linearize.hpp>
 #include <pendula/run/subject_kinds.hpp>
 #include <pendula/system/constraint_forces.hpp>
+#include <pendula/system/no_constraints.hpp>
 #include <pendula/system/parameter_slopes.hpp>
 #include <pendula/system/state_slopes.hpp>
 #include <pendula/system/system_model.hpp>
@@ -209,7 +210,10 @@ bool bring_back_others(const Subject& subject, const Independent& independent, M
 
 SystemModel regular_model(const Subject& subject, const Motion& motion) {
   require_regular(subject, motion);
-  return as_its_kind_at(subject, motion.time, [&](const auto& kind) { return system_model_of(kind, motion); });
+  const SystemModel model =
+      as_its_kind_at(subject, motion.time, [&](const auto& kind) { return system_model_of(kind, motion); });
+  require_no_constraints_of_rates(model.info(), "linearization: expected constraints of positions only");
+  return model;
 }
 
 }  // namespace

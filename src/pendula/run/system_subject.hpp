@@ -147,7 +147,8 @@ class SystemSubject : public Subject {
       const std::string name(info().constraints[k]), unit(info().constraint_units[k]);
       const bool is_one = unit.find_first_of(" */") == std::string::npos;  // m, m^2
       const std::string over = unit == "1" || unit.empty() ? "" : is_one ? "/" + unit : "/(" + unit + ")";
-      add("force_" + name, "J" + over, Role::force, "force of the constraint " + name);
+      add("force_" + name, (info().constraint_is_of_rates[k] ? "W" : "J") + over, Role::force,
+          "force of the constraint " + name);
     }
     add("energy", "J", Role::energy, "energy v dL/dv - L");
     return quantities;

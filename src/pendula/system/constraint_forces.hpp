@@ -8,25 +8,10 @@
 
 namespace pendula {
 
-/// Second derivatives of a function of n coordinates from its second rates, of which rate(k, l) is the one where only
-/// the coordinates k and l move, at a rate of 1; of 2 where they are the same; n stands for none. What is linear in
-/// rates, or does not depend on them, drops out. Calls take(k, l, ∂²/∂q_k ∂q_l) for all pairs.
-template <class Rate, class Take>
-void take_second_derivatives(std::size_t n, Rate rate, Take take) {
-  const auto none = rate(n, n);
-  for (std::size_t k = 0; k < n; ++k) {
-    const auto of_k = rate(k, n);
-    for (std::size_t l = 0; l <= k; ++l) {
-      const auto found = decltype(of_k)(0.5) * ((rate(k, l) - of_k) + (none - rate(l, n)));
-      take(k, l, found);
-      if (l != k) take(l, k, found);
-    }
-  }
-}
-
 /// Constraints g(q, t) = 0 of a system at one place, and forces Gᵀ λ, G = ∂g/∂q, by which they hold there:
 ///   K λ = −(G a + d²g/dt² without accelerations),  K = G M⁻¹ Gᵀ,  a the accelerations without them.
-/// Where constraints follow from others, λ is one of many, and Gᵀ λ is the same for all.
+/// Where constraints follow from others, λ is one of many, and Gᵀ λ is the same for all. Of constraints of rates,
+/// A(q, t) v + b(q, t) = 0, g is 0, G stands for A, and dg/dt for A v + b.
 class ConstraintForces {
  public:
   explicit ConstraintForces(const SystemInfo& info)
@@ -39,6 +24,8 @@ class ConstraintForces {
         rates_(count_),
         second_(count_),
         moving_(coordinates_),
+        by_place_(slopes_),
+        at_rest_(slopes_),
         masses_(static_cast<Eigen::Index>(coordinates_)),
         softness_(static_cast<Eigen::Index>(count_)) {}
 
@@ -93,17 +80,28 @@ class ConstraintForces {
   /// dg/dt in the state that stop was called with.
   double rate(std::size_t i) const { return rates_[i]; }
 
-  /// Σ_i J_i ∂²g_i/∂q² at q for impulses J  (coordinates x coordinates).
+  /// Σ_i J_i ∂G_ik/∂q_l at q for impulses J  (coordinates k x coordinates l): dg/dt is linear in rates.
   void find_curvature(const SystemAt<1>& here, const double* q, const double* impulses, double* found) {
-    const auto rate = [&](std::size_t k, std::size_t l) {
-      for (std::size_t i = 0; i < coordinates_; ++i) moving_[i] = (i == k ? 1.0 : 0.0) + (i == l ? 1.0 : 0.0);
-      here(&SystemFunctions::constraint_rates, q, moving_.data(), rates_.data(), second_.data());
-      double sum = 0;
-      for (std::size_t i = 0; i < count_; ++i) sum += impulses[i] * second_[i];
-      return sum;
-    };
-    take_second_derivatives(coordinates_, rate,
-                            [&](std::size_t k, std::size_t l, double second) { found[k * coordinates_ + l] = second; });
+    std::fill(moving_.begin(), moving_.end(), 0.0);
+    find_rates_by_place(here, q, moving_.data(), at_rest_.data());
+    for (std::size_t k = 0; k < coordinates_; ++k) {
+      moving_[k] = 1;
+      find_rates_by_place(here, q, moving_.data(), by_place_.data());
+      moving_[k] = 0;
+      for (std::size_t l = 0; l < coordinates_; ++l) {
+        double sum = 0;
+        for (std::size_t i = 0; i < count_; ++i) {
+          const std::size_t at = i * coordinates_ + l;
+          sum += impulses[i] * (by_place_[at] - at_rest_[at]);
+        }
+        found[k * coordinates_ + l] = sum;
+      }
+    }
+  }
+
+  /// The derivative of dg/dt by q, in the state q, v  (count x coordinates).
+  void find_rates_by_place(const SystemAt<1>& here, const double* q, const double* v, double* found) const {
+    here(&SystemFunctions::constraint_rate_slopes, q, v, found);
   }
 
  private:
@@ -119,6 +117,7 @@ class ConstraintForces {
   std::vector<double> moved_;    // M⁻¹ Gᵀ, constraint by constraint
   std::vector<double> inverse_;  // of K
   std::vector<double> rates_, second_, moving_;
+  std::vector<double> by_place_, at_rest_;  // ∂(dg/dt)/∂q
   LinearSystem masses_;
   GeneralInverse softness_;
   std::size_t independent_ = 0;

@@ -84,6 +84,7 @@ constexpr std::array<Signature, Program::many + Program::plain + Program::series
     {"call_arguments", 2, {q, v, {"found", Rows::arguments}}},
     {"constraints", 1, {q, {"g", Rows::constraints}, {"g_D_q", Rows::constraint_slopes}}},
     {"constraint_rates", 2, {q, v, {"g_dot", Rows::constraints}, {"g_ddot", Rows::constraints}}},
+    {"constraint_rate_slopes", 2, {q, v, {"g_dot_D_q", Rows::constraint_slopes}}},
     {"constraints_along",
      2,
      {{{"d_parameters", Rows::parameters}, q, {"dg", Rows::constraints}, {"d_g_D_q", Rows::constraint_slopes}}}},
@@ -333,7 +334,7 @@ class OwnedKernel {
       if (lacks_tangents) of->series_start_along = nullptr, of->series_next_along = nullptr;
       if (info.argument_is_base.empty()) of->call_arguments = nullptr;
       if (!info.constraints.empty()) continue;
-      of->constraints = nullptr, of->constraint_rates = nullptr;
+      of->constraints = nullptr, of->constraint_rates = nullptr, of->constraint_rate_slopes = nullptr;
       of->constraints_along = nullptr, of->constraint_rates_along = nullptr;
     }
     if (info.switches.empty()) table_.plain.switches = nullptr;

@@ -81,6 +81,7 @@ class Widths {
     if (const std::size_t count = table_.info.constraints.size(); count > 0) {
       compare(&Of::constraints, {&q_}, {count, count * n_});
       compare(&Of::constraint_rates, {&q_, &v_}, {count, count});
+      compare(&Of::constraint_rate_slopes, {&q_, &v_}, {count * n_});
       compare(&Of::constraints_along, {&parameters_, &q_}, {count, count * n_});
       compare(&Of::constraint_rates_along, {&parameters_, &v_, &a_, &q_, &v_}, {count, count});
     }

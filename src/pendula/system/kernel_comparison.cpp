@@ -43,6 +43,7 @@ void evaluate_kernel(const SystemTable& table, const PlainSystem& system, double
   if (const std::size_t count = info.constraints.size(); count > 0) {
     write({count, count * n}, of.constraints, q);
     write({count, count}, of.constraint_rates, q, v);
+    write({count * n}, of.constraint_rate_slopes, q, v);
   }
   write({n}, of.acceleration, q, v);
   write({n}, of.velocity_from_momentum, q, momenta);
@@ -166,6 +167,7 @@ std::vector<KernelLine> KernelComparison::check() const {
       case Written::constraints_q:
       case Written::constraint_rates:
       case Written::constraint_second_rates:
+      case Written::constraint_rates_q:
         return constraints;
       default:
         return residuals;

@@ -34,8 +34,9 @@ enum class Written {
   constraints_q,
   constraint_rates,
   constraint_second_rates,  ///< at a = 0
+  constraint_rates_q,
 };
-inline constexpr int written_count = 20;
+inline constexpr int written_count = 21;
 
 /// How many numbers a quantity has, for a system of n coordinates.
 constexpr int written_size(Written what, int n, int point_components, int constraints) {
@@ -59,6 +60,7 @@ constexpr int written_size(Written what, int n, int point_components, int constr
     case Written::constraint_second_rates:
       return constraints;
     case Written::constraints_q:
+    case Written::constraint_rates_q:
       return constraints * n;
     default:
       return n;
@@ -90,7 +92,8 @@ inline constexpr std::array kernel_outputs = {Written::kinetic_energy,
                                               Written::constraints,
                                               Written::constraints_q,  // constraints
                                               Written::constraint_rates,
-                                              Written::constraint_second_rates};
+                                              Written::constraint_second_rates,
+                                              Written::constraint_rates_q};
 
 /// What evaluate_kernel writes after these, n numbers each: solutions of linear systems.
 enum class Solved {

@@ -51,6 +51,7 @@ class KernelFunctions : KernelNumbers<S, W> {
             tells_arguments<S> ? &call_arguments : nullptr,
             has_constraints<S> ? &constraints : nullptr,
             has_constraints<S> ? &constraint_rates : nullptr,
+            has_constraints<S> ? &constraint_rate_slopes : nullptr,
             has_constraints<S> ? &constraints_along : nullptr,
             has_constraints<S> ? &constraint_rates_along : nullptr,
             has_series<S> && W == 8 ? &KernelSeries<S, W>::start_along : nullptr,
@@ -181,6 +182,13 @@ class KernelFunctions : KernelNumbers<S, W> {
       S::constraint_rates(parameters(at), vector(q), vector(v), first, second);
       write(first, g_dot);
       write(second, g_ddot);
+    }
+  }
+  static void constraint_rate_slopes(const Conditions& at, const double* q, const double* v, double* g_dot_D_q) {
+    if constexpr (has_constraints<S>) {
+      typename S::template ConstraintSlopes<L> slopes;
+      S::constraint_rate_slopes(parameters(at), vector(q), vector(v), slopes);
+      write(slopes, g_dot_D_q);
     }
   }
 

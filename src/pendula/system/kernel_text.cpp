@@ -107,6 +107,7 @@ bool KernelDescription::take(KernelText& text) {
   } else if (kind == "constraint") {
     constraints_.push_back(text.word());
     constraint_units_.push_back(text.word());
+    constraint_is_of_rates_.push_back(text.flag());
   } else if (kind == "series") {
     series_.has_momenta = text.flag();
     series_.sums = text.whole(0, many);
@@ -158,7 +159,8 @@ SystemInfo KernelDescription::info() const {
           connection_ends_,
           sums_,
           constraints_,
-          constraint_units_};
+          constraint_units_,
+          constraint_is_of_rates_.all()};
 }
 
 }  // namespace pendula

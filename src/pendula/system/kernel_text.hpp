@@ -70,7 +70,7 @@ class KernelDescription {
   bool depends_on_time_ = false, constant_masses_ = false;
   Names coordinates_, coordinate_units_, parameters_, parameter_units_, inputs_, input_units_, points_, switches_,
       constraints_, constraint_units_, point_kinds_, connection_kinds_;
-  Flags is_angle_, is_periodic_, is_positive_, is_per_link_, argument_is_base_;
+  Flags is_angle_, is_periodic_, is_positive_, is_per_link_, argument_is_base_, constraint_is_of_rates_;
   std::vector<int> parameter_sizes_, point_sizes_, connection_ends_;
   std::vector<double> parameter_defaults_;
   std::vector<SeriesSum> sums_;

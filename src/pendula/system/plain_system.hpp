@@ -65,6 +65,7 @@ struct SystemInfo {
   std::span<const SeriesSum> series_sums;              ///< (SeriesInfo::sums)
   /// What is 0 at all times (SystemFunctions::constraints).
   std::span<const std::string_view> constraints, constraint_units;
+  std::span<const bool> constraint_is_of_rates;  ///< whether it is A v + b, else g(q, t)
 
   /// Number of parameters of the model itself, without the last ones, which tell the sides of switching functions.
   std::size_t own_parameters() const { return parameters.size() - 2 * switches.size(); }
@@ -100,7 +101,8 @@ constexpr SystemInfo info_of() {
           connection_ends<S>(),
           series_sums_of<S>(),
           constraint_names<S>(),
-          constraint_units<S>()};
+          constraint_units<S>(),
+          constraint_is_of_rates<S>()};
 }
 
 }  // namespace pendula

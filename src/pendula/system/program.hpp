@@ -33,7 +33,7 @@ struct ProgramFunction {
 struct Program {
   /// Numbers of functions: those of SystemFunctions except iterate, then those of PlainFunctions, and
   /// series_start and series_next.
-  static constexpr std::size_t many = 19, plain = 4, series = 2;
+  static constexpr std::size_t many = 20, plain = 4, series = 2;
   static constexpr std::size_t series_start_along = many - 2, series_next_along = many - 1;
   static constexpr std::size_t series_start = many + plain, series_next = series_start + 1;
 

@@ -94,6 +94,12 @@ constexpr std::span<const std::string_view> constraint_units() {
   if constexpr (has_constraints<S>) return S::constraint_units;
   return {};
 }
+/// Which of them are of rates.
+template <class S>
+constexpr std::span<const bool> constraint_is_of_rates() {
+  if constexpr (has_constraints<S>) return S::constraint_is_of_rates;
+  return {};
+}
 
 /// What the points of a kernel are drawn as; empty if the kernel does not say.
 template <class S>

@@ -66,11 +66,14 @@ struct SystemFunctions {
                               double* df);
   /// Arguments of the model's functions, (arguments, W) (field_look.hpp); null if the kernel does not provide them.
   void (*call_arguments)(const Conditions&, Numbers q, Numbers v, double* found);
-  /// What is 0 at all times, g(q, t), (constraints, W), and ∂g/∂q; forces (∂g/∂q)ᵀ λ keep it so. This and the next
-  /// three are null without constraints.
+  /// What is 0 at all times, g(q, t), (constraints, W), and ∂g/∂q; forces (∂g/∂q)ᵀ λ keep it so. Of a constraint of
+  /// rates, A(q, t) v + b(q, t) = 0, g is 0, ∂g/∂q is A, and dg/dt is A v + b. This and the next four are null without
+  /// constraints.
   void (*constraints)(const Conditions&, Numbers q, double* g, double* g_D_q);
   /// dg/dt, and d²g/dt² where nothing accelerates.
   void (*constraint_rates)(const Conditions&, Numbers q, Numbers v, double* g_dot, double* g_ddot);
+  /// ∂(dg/dt)/∂q, where rates are the same.
+  void (*constraint_rate_slopes)(const Conditions&, Numbers q, Numbers v, double* g_dot_D_q);
   /// Derivatives of g and ∂g/∂q along a variation of parameters; of what constraint_rates gives also along (dq, dv).
   void (*constraints_along)(const Conditions&, Numbers parameters, Numbers q, double* dg, double* dg_D_q);
   void (*constraint_rates_along)(const Conditions&, Numbers parameters, Numbers dq, Numbers dv, Numbers q, Numbers v,
@@ -125,6 +128,6 @@ const SystemFunctions& functions_of(const SystemTable& table) {
 }
 
 /// Version of the layout that crosses to a separately compiled kernel: SystemTable and everything that it points to.
-inline constexpr int system_interface = 18;
+inline constexpr int system_interface = 19;
 
 }  // namespace pendula
