@@ -291,7 +291,8 @@ def test_one_that_follows_from_positions(iteration, scenario, pendula, simulate,
     assert run["degrees_of_freedom"] == 1
     file = tmp_path / "pendulum.toml"
     file.write_text(
-        '[chain]\nspace = "planar"\nmasses = [2.0]\nlengths = [1.0]\n[start]\ntheta = [1.0]\n[run]\nduration = 2.0\naccuracy = 1e-11\n'
+        '[chain]\nspace = "planar"\nmasses = [2.0]\nlengths = [1.0]\n'
+        "[start]\ntheta = [1.0]\n[run]\nduration = 2.0\naccuracy = 1e-11\n"
     )
     angle = simulate(file)["final"]["q"]["theta_1"]
     assert max(run["constraint_error"].values()) < 1e-13  # measured 2.8e-14
