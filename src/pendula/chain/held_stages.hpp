@@ -51,6 +51,8 @@ class HeldStages : public ChainTurns<Space, S, N, Real> {
       if (family != Family::gauss) throw std::invalid_argument("method: expected gauss for a chain whose end is held");
       end_.emplace(end);
       room_ = rods_.place();
+      for (int i = 0; i < links(); ++i) fall_squared_ += constants_[i].inverse_square;
+      fall_squared_ *= this->gravity_ * this->gravity_;
     } else {
       throw std::invalid_argument("chain.end: expected numbers of double precision, and links counted at run time");
     }
@@ -140,6 +142,13 @@ class HeldStages : public ChainTurns<Space, S, N, Real> {
     wanted_ = end_->wanted(time, columns_.h(), Ends::gap(rods_, end_place(time)), rate, L::load(inverse));
     for (std::size_t k = 0; k < D; ++k) wanted_[k] = wanted_[k] - L(low[k]);
     wanted_[D - 1] = fma(columns_.hc(), L(this->gravity_), wanted_[D - 1]);
+    // Where weight and tension balance, corrections are the rounding of these, however little moves; unless the step
+    // is too long for the fastest swing, by which small ones grow.
+    constexpr Real share = 1e-4;  // the square of what, times last bits, is their rounding for 1,000 links
+    const Real h_squared = columns_.h() * columns_.h();
+    if (h_squared * this->fastest_swing_ <= 1) {
+      this->scale_ = std::max(this->scale_, share * fall_squared_ * h_squared * h_squared);
+    }
   }
 
   // ChainMotion::iterate.
@@ -314,6 +323,7 @@ class HeldStages : public ChainTurns<Space, S, N, Real> {
   struct Nothing {};
   std::conditional_t<may_be_held, std::optional<HeldEnd<D, S>>, Nothing> end_;
   double start_time_ = 0;  // of the step
+  Real fall_squared_{};    // Σ (g/l)²  [1/s^4]
   Vector wanted_{},
       push_{};  // at the stages: what increments over h b sum up to besides gravity; what the hook adds to z
   Numbers last_push_{}, left_rate_{};
