@@ -299,7 +299,8 @@ Motion equilibrium(const Subject& subject, const Motion& near) {
     at.q = (at.q.array().abs() < smallest * scale).select(0, at.q);
     return at;
   }
-  throw std::invalid_argument("at: expected a start near an equilibrium, got one from which Newton's method finds none");
+  throw std::invalid_argument(
+      "at: expected a start near an equilibrium, got one from which Newton's method finds none");
 }
 
 }  // namespace pendula
