@@ -4,10 +4,12 @@ import os
 import subprocess
 import sys
 from concurrent.futures import ThreadPoolExecutor
+from html import escape
 from pathlib import Path
 from typing import ClassVar
 
 from docutils import nodes
+from sphinx.addnodes import download_reference
 from sphinx.application import Sphinx
 from sphinx.errors import ExtensionError
 from sphinx.util.docutils import SphinxDirective
@@ -83,10 +85,20 @@ class Gallery(SphinxDirective):
         return [nodes.raw("", f'<ul class="motions">{cards}</ul>', format="html")]
 
 
+def share_laboratory(app: Sphinx, doctree: nodes.document) -> None:
+    """The laboratory of the repository is that of the site: there is one copy of it to download."""
+    up = "../" * app.env.docname.count("/")
+    for node in list(doctree.findall(download_reference)):
+        if node["reftarget"].endswith("generated/laboratory.html"):
+            link = f'<a download="laboratory.html" href="{up}live/lab.html">{escape(node.astext())}</a>'
+            node.replace_self(nodes.raw("", link, format="html"))
+
+
 def setup(app: Sphinx) -> ExtensionMetadata:
     app.add_directive("laboratory", Laboratory)
     app.add_directive("gallery", Gallery)
     app.connect("builder-inited", write_pages)
+    app.connect("doctree-read", share_laboratory, priority=400)  # before Sphinx copies what is downloaded
     (folder_of(app) / "live").mkdir(parents=True, exist_ok=True)
     app.config.html_extra_path = [str(folder_of(app))]
     return {"parallel_read_safe": True, "parallel_write_safe": True}

@@ -106,7 +106,7 @@ def test_nothing_comes_from_elsewhere(site):
 
 def test_the_site_is_small(site):
     size = sum(file.stat().st_size for file in site.rglob("*") if file.is_file())
-    assert size < 60e6  # bytes; measured 17e6
+    assert size < 60e6  # bytes; measured 58.4e6, 48e6 of them pages of the gallery
 
 
 @pytest.mark.parametrize("question", QUESTIONS)

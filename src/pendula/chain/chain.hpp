@@ -34,7 +34,8 @@ struct ChainParameters {
   /// Constant torque, or empty for none  N m
   Torque<Space, N> torque = Torque<Space, N>::Zero(Space::torque_components, at_first);
   std::vector<Drive<Space>> drives = {};  ///< sinusoidal torques
-  std::optional<ChainEnd> end = {};       ///< what holds the last bob; nothing for one that hangs free
+  /// What holds the last bob; nothing for one that hangs free.
+  std::optional<ChainEnd> end = {};  // NOLINT(readability-redundant-member-init): GCC warns where it is left out
 
  private:
   static constexpr Eigen::Index at_first = N == Eigen::Dynamic ? 0 : N;

@@ -327,7 +327,7 @@ class HeldStages : public ChainTurns<Space, S, N, Real> {
   Vector wanted_{},
       push_{};  // at the stages: what increments over h b sum up to besides gravity; what the hook adds to z
   Numbers last_push_{}, left_rate_{};
-  std::pair<double, double> errors_{};
+  std::pair<double, double> errors_;
   typename Base::Rods::FullState room_;
 };
 
