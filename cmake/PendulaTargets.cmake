@@ -51,6 +51,7 @@ set(_pendula_warnings
     -Wall -Wextra -Wpedantic -Wconversion -Wsign-conversion -Wshadow -Wold-style-cast -Wcast-qual -Wnon-virtual-dtor
     -Woverloaded-virtual -Wextra-semi -Wimplicit-fallthrough -Wunused
     "$<$<CXX_COMPILER_ID:GNU>:-Wduplicated-cond;-Wlogical-op;-Wno-array-bounds;-Wno-stringop-overread;-Wno-maybe-uninitialized>"
+    "$<$<CXX_COMPILER_ID:Clang>:-Wshadow-uncaptured-local>"
     "$<$<AND:$<CXX_COMPILER_ID:GNU>,$<VERSION_LESS:$<CXX_COMPILER_VERSION>,13>>:-Wno-uninitialized>"
     $<$<BOOL:${PENDULA_WARNINGS_AS_ERRORS}>:-Werror>)
 # Not asked for: what AddressSanitizer (null, object-size) and vector loads (alignment) trap by themselves. Those are most

@@ -102,8 +102,7 @@ void print_model(const Json& model) {
   });
   if (!model["constraints"].empty()) {
     std::cout << '\n'
-              << "degrees of freedom: " << model["degrees_of_freedom"]
-              << " of rates, if no constraint follows from others\n";
+              << "degrees of freedom: " << model["degrees_of_freedom"] << ", if no constraint follows from others\n";
   }
   std::cout << '\n' << "file  " << text(model, "file") << '\n';
   if (model["has_links"]) std::cout << "links " << model["links"] << "; --links N tells it of N\n";

@@ -115,6 +115,6 @@ def test_a_linkage(pendula):
     for line in [
         "constraint  unit  of",
         "loop_x      m     positions",
-        "degrees of freedom: 1 of rates, if no constraint follows from others",
+        "degrees of freedom: 1, if no constraint follows from others",
     ]:
         assert line in lines

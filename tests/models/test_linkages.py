@@ -380,6 +380,19 @@ def test_forces_know_inputs(by, scenario, rows):
         assert abs(d * d + y * y - 0.25) < 1e-13
 
 
+@pytest.mark.parametrize("name", LINKAGES)
+def test_rows_just_after_a_step(name, scenario, rows):
+    """Rounding of constraints is all that is left to correct there."""
+    after = [0.0, *(10.0**k for k in range(-15, -6))]
+    file = scenario(*LINKAGES[name], more="")
+    found = rows(file, run__stages=4, run__duration=1, output__times=[0.5 + h for h in after])
+    rates = [column for key, column in found.items() if "_dot" in key]
+    assert rates
+    for column in rates:
+        # By accelerations, measured up to 6.3 in these units; where iterations do not end, by 1e-6.
+        assert all(abs(x - column[0]) <= 20 * h + 1e-13 for h, x in zip(after, column, strict=True))
+
+
 @pytest.mark.parametrize("seed", range(24))
 def test_wild_guesses_find_the_nearest_way_to_close(seed, scenario, simulate):
     """Two circles about the joint of the first bar and the support meet twice."""

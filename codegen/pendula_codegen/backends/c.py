@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence, Set
 from dataclasses import dataclass
 from itertools import accumulate
@@ -108,7 +109,7 @@ def quoted(text: str) -> str:
     return f'"{text}\\n"'
 
 
-class Statements:
+class Statements(ABC):
     """The steps of a tape as statements, one for each number.
 
     number   the type of numbers
@@ -146,8 +147,8 @@ class Statements:
         array, k = step.row
         return [f"const {self.number} {self._names[step.first]} = {array}[{k}];"]
 
-    def _sine_and_cosine(self, step: Step) -> list[str]:
-        raise NotImplementedError
+    @abstractmethod
+    def _sine_and_cosine(self, step: Step) -> list[str]: ...
 
     # --- what they have in common
 

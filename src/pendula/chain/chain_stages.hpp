@@ -275,7 +275,10 @@ class ChainStages : public HeldStages<Space, S, N, RealType> {
     this->move_on();
     this->note_end();
     prediction_.accept();
-    if (prediction_.steps() % restoring_interval_ == 0) rods_.restore_lengths(constants_, Everyone{});
+    if (prediction_.steps() % restoring_interval_ == 0) {
+      rods_.restore_lengths(constants_, Everyone{});
+      this->return_end();
+    }
     for (int i = 0; i < links(); ++i) anchors_[i].follow(direction(i));
   }
 

@@ -96,7 +96,10 @@ class ClosedStart {
       double part = 1;
       while (part > 1e-12) {
         const Vector next = force + part * change;
-        if (pull_of(next).value - next.dot(hook) <= value - part * slope / 10) break;
+        const Pull there = pull_of(next);
+        // Near the solution the value changes by its rounding alone; what is lacking still tells.
+        if (there.value - next.dot(hook) <= value - part * slope / 10) break;
+        if ((hook - there.gradient).norm() < lacking.norm() / 2) break;
         part /= 2;
       }
       if (part <= 1e-12) break;

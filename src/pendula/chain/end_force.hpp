@@ -18,16 +18,12 @@ struct PlacedRods {
   template <class Motion>
   PlacedRods(const Chain<Space>& chain, const Motion& motion) : constants(chain), rods(chain.links()) {
     for (int i = 0; i < chain.links(); ++i) {
-      std::array<double, Space::dof> q, v;
-      for (std::size_t a = 0; a < q.size(); ++a) {
-        q[a] = motion.q[static_cast<Eigen::Index>(a) * chain.links() + i];
-        v[a] = motion.v[static_cast<Eigen::Index>(a) * chain.links() + i];
-      }
       using Wide = typename RodState<Space>::Wide;
       std::array<Wide, Space::dof> angles, rates;
-      for (std::size_t a = 0; a < q.size(); ++a) {
-        angles[a] = Wide(q[a]);
-        rates[a] = Wide(v[a]);
+      for (std::size_t a = 0; a < angles.size(); ++a) {
+        const Eigen::Index at = static_cast<Eigen::Index>(a) * chain.links() + i;
+        angles[a] = Wide(motion.q[at]);
+        rates[a] = Wide(motion.v[at]);
       }
       rods.set_mass(i, constants[i].inverse_mass);
       rods.start(0, i, Wide(constants[i].length), Heading<Space, Wide>(angles, rates));

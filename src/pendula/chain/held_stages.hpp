@@ -87,6 +87,12 @@ class HeldStages : public ChainTurns<Space, S, N, Real> {
       if (is_held()) note_held();
     }
   }
+  /// After lengths were restored: a gap of rounding would have to close within the next step, however short that is.
+  void return_end() {
+    if constexpr (may_be_held) {
+      if (is_held()) close_gap();
+    }
+  }
   /// What a hook that moves brings in the finished step  [J]. The impulse at its end is found there.
   Real brought_by_end() {
     if constexpr (may_be_held) {
@@ -127,11 +133,11 @@ class HeldStages : public ChainTurns<Space, S, N, Real> {
       throw std::invalid_argument(
           "chain.end: expected a start in which the chain can move, got one stretched straight between its ends");
     }
-    for (int correction = 0; correction < 3; ++correction) {
-      Ends::move_end(rods_, constants_, scaled(Real(-1), Ends::gap(rods_, end_place(time))));
-    }
+    for (int correction = 0; correction < 3; ++correction) close_gap();
     Ends::push_to_rate(rods_, constants_, end_rate(time));
   }
+
+  void close_gap() { Ends::move_end(rods_, constants_, scaled(Real(-1), Ends::gap(rods_, end_place(start_time_)))); }
 
   // Of a step from `time`, whose other stages are predicted.
   [[gnu::noinline]] void prepare_held(double time) {
@@ -185,9 +191,9 @@ class HeldStages : public ChainTurns<Space, S, N, Real> {
   void tempo_held(Real& pace, Real& quickening) const {
     Real sum(0), growth(0);
     const auto fallen = [&](int i) {
-      Numbers fallen{};
-      if (i == 0) fallen[D - 1] = -this->gravity_;
-      return fallen;
+      Numbers weight{};
+      if (i == 0) weight[D - 1] = -this->gravity_;
+      return weight;
     };
     const Numbers wanted = components<D>([&](std::size_t k) { return Real(end_->end().acceleration(k, start_time_)); });
     Ends::accelerations(rods_, constants_, fallen, wanted,

@@ -113,10 +113,11 @@ class FixedPointStop {
     if (count_ > 6) verdict.lost = verdict.lost | ((!is_small) & (rate > Num(1.0)) & (before_ > Num(1.0)));
   }
 
-  // The average rate of the corrections before this one, not squared.
+  // The average rate of the corrections before this one, not squared; 1 where the first one was the smallest, as in a
+  // step so short that nothing but rounding is left to correct.
   Num average() const {
     const double rates = double(count_ - 1 - Sequences) / Sequences;
-    return exp(Num(0.5 / rates) * log(best_ / begin_));
+    return exp(Num(0.5 / rates) * min(log(best_ / begin_), Num(0.0)));
   }
 
   // The square of the correction `back` iterations ago; with two sequences the larger of it and the one before.

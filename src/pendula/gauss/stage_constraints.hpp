@@ -418,7 +418,6 @@ class StageConstraints {
 
   // Σ_i J_i ∂G_ik/∂q_l at the nodes 1 … s − 1: dg/dt is linear in rates.
   void find_curvature() {
-    if (!of_rates_) return find_second_derivatives();
     for (std::size_t k = 0; k < coordinates_; ++k) std::fill_n(moving_[k], width, 0.0);
     at_nodes_(&SystemFunctions::constraint_rate_slopes, places_[0], moving_[0], at_rest_[0]);
     for (std::size_t k = 0; k < coordinates_; ++k) {
@@ -436,33 +435,6 @@ class StageConstraints {
         }
       }
     }
-  }
-
-  // The same of constraints of positions alone, from second rates: where only the coordinates k and l move, at a rate
-  // of 1; of 2, where they are the same; n stands for none. (find_curvature differs by rounding: with it, Newton took a
-  // sixth fewer iterations for a hanging chain; but steps of linkages would be others than they were.)
-  void find_second_derivatives() {
-    const std::size_t n = coordinates_;
-    const L none = second_rate(n, n);
-    for (std::size_t k = 0; k < n; ++k) {
-      const L of_k = second_rate(k, n);
-      for (std::size_t l = 0; l <= k; ++l) {
-        const L found = L(0.5) * ((second_rate(k, l) - of_k) + (none - second_rate(l, n)));
-        found.store(curvature_[k * n + l]);
-        if (l != k) found.store(curvature_[l * n + k]);
-      }
-    }
-  }
-  L second_rate(std::size_t k, std::size_t l) {
-    for (std::size_t i = 0; i < coordinates_; ++i) {
-      std::fill_n(moving_[i], width, (i == k ? 1.0 : 0.0) + (i == l ? 1.0 : 0.0));
-    }
-    at_nodes_(&SystemFunctions::constraint_rates, places_[0], moving_[0], rates_[0], rates_[count_]);
-    alignas(pack_alignment) double sums[width] = {};
-    for (std::size_t i = 0; i < count_; ++i) {
-      for (std::size_t m = 1; m < nodes_.stages(); ++m) sums[m - 1] += impulses_[i][m] * rates_[count_ + i][m - 1];
-    }
-    return L::load(sums);
   }
 
   // What impulses push, by slopes at the nodes.
