@@ -8,10 +8,13 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
-from sympy import Add, Expr, Integer, Mul, Symbol
+from sympy import Add, Expr, Integer, Mul, Pow, Symbol
 
 from pendula_codegen.errors import GenerationError
+
+REMEMBERED = 1 << 17  # expressions
 
 
 @dataclass(frozen=True)
@@ -63,28 +66,46 @@ def require_declared(expression: Expr, declared: Iterable[Symbol], what: str) ->
 
 
 def gradient(expression: Expr, symbols: Sequence[Symbol]) -> list[Expr]:
-    """∂expression/∂symbol for each symbol.
+    """∂expression/∂symbol for each symbol."""
+    return [derivative(expression, symbol) for symbol in symbols]
 
-    A chain's Lagrangian is a long sum of products that each hold few symbols, so every product is
-    differentiated by its own symbols only, factor by factor: the work is proportional to what is not zero,
-    and SymPy remembers the derivative of a factor that comes again.
+
+@lru_cache(maxsize=REMEMBERED)
+def derivative(expression: Expr, symbol: Symbol) -> Expr:
+    """∂expression/∂symbol.
+
+    Of sums and products only terms and factors that hold the symbol are looked at, and what comes again is
+    differentiated once: second and third derivatives of a Lagrangian have few different parts.
     """
-    parts: dict[Symbol, list[Expr]] = {symbol: [] for symbol in symbols}
-    for term in Add.make_args(expression):
-        factors = Mul.make_args(term)
-        for k, factor in enumerate(factors):
-            for symbol, slope in _factor_gradient(factor, parts.keys() & factor.free_symbols):
-                parts[symbol].append(Mul(*factors[:k], slope, *factors[k + 1 :]))
-    return [Add(*parts[symbol]) for symbol in symbols]
+    if symbol not in symbols_of(expression):
+        return Integer(0)
+    if expression.is_Symbol:
+        return Integer(1)
+    if expression.is_Add:
+        return Add(*(derivative(term, symbol) for term in expression.args if symbol in symbols_of(term)))
+    if expression.is_Mul:
+        factors = expression.args
+        return Add(
+            *(
+                Mul(*factors[:k], derivative(factor, symbol), *factors[k + 1 :])
+                for k, factor in enumerate(factors)
+                if symbol in symbols_of(factor)
+            )
+        )
+    if expression.is_Pow and symbol not in symbols_of(expression.exp):
+        base, power = expression.args
+        return Mul(power, Pow(base, power - 1), derivative(base, symbol))
+    if expression.is_Function and len(expression.args) == 1:
+        return Mul(expression.fdiff(1), derivative(expression.args[0], symbol))
+    return expression.diff(symbol)
 
 
-def _factor_gradient(factor: Expr, symbols: Iterable[Symbol]) -> Iterable[tuple[Symbol, Expr]]:
-    if factor.is_Symbol:
-        return ((symbol, Integer(1)) for symbol in symbols)
-    if factor.is_Add or factor.is_Mul:
-        held = list(symbols)
-        return zip(held, gradient(factor, held), strict=True)
-    return ((symbol, factor.diff(symbol)) for symbol in symbols)
+@lru_cache(maxsize=REMEMBERED)
+def symbols_of(expression: Expr) -> frozenset[Symbol]:
+    """Its free symbols; sympy looks at all of an expression each time."""
+    if not expression.args:
+        return frozenset(expression.free_symbols)
+    return frozenset().union(*(symbols_of(part) for part in expression.args))
 
 
 def jacobian(expressions: Sequence[Expr], symbols: Sequence[Symbol]) -> list[list[Expr]]:

@@ -27,8 +27,8 @@ class LinearSystem(tuple["NDArray[np.float64]", "NDArray[np.float64]"]):
     C, D : numpy.ndarray
         Derivatives of outputs with respect to the state and to inputs: a row for each output.
     basis : numpy.ndarray
-        (2n, 2d): deviations of all n coordinates and their rates from those of x, which are d coordinates, and their
-        rates, from which the others follow by constraints. The identity without constraints.
+        (2n, d): deviations of all n coordinates and their rates from those of x, which are d coordinates and rates from
+        which the others follow by constraints. The identity without constraints.
     names, inputs, outputs : list of str
         Names of the numbers in x, u and y.
     step : float or None
@@ -50,12 +50,12 @@ class LinearSystem(tuple["NDArray[np.float64]", "NDArray[np.float64]"]):
 
     @property
     def A(self) -> NDArray[np.float64]:
-        """(2d, 2d)"""
+        """(d, d)"""
         return self[0]
 
     @property
     def B(self) -> NDArray[np.float64]:
-        """(2d, inputs)"""
+        """(d, inputs)"""
         return self[1]
 
     @property
@@ -96,11 +96,6 @@ def _again(a: NDArray[np.float64], b: NDArray[np.float64], told: Mapping[str, An
     return LinearSystem(a, b, **told)
 
 
-def rows_of(coordinates: Sequence[int], rows: int) -> list[int]:
-    """The rows of these coordinates and of their rates among those of all."""
-    return [*coordinates, *(rows // 2 + k for k in coordinates)]
-
-
 def seen(
     made: _core.Prepared,
     outputs: Outputs | None,
@@ -120,13 +115,13 @@ def seen(
             raise InputError(f"outputs: expected columns or expressions, got {text!r}")
     with plainly():
         c, d = _core.output_slopes(made, list(texts.values()), time, state, list(held))
-    coordinates, basis = independent
+    places, basis = independent
     names = state_names(made)
     return {
         "C": c @ basis,
         "D": d,
         "basis": basis,
-        "names": [names[row] for row in rows_of(coordinates, len(names))],
+        "names": [names[place] for place in places],
         "inputs": made.inputs,
         "outputs": list(texts),
     }

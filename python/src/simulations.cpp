@@ -94,7 +94,7 @@ void define_simulations(nb::module_& module) {
       .def("independent",
            [](const Mover& self) {
              const Independent found = find_independent(self.subject(), self.motion());
-             return std::pair(found.coordinates, array_of(found.basis));
+             return std::pair(found.places, array_of(found.basis));
            })
       .def("save", [](Mover& self) { return vector_of(self.save().numbers); })
       .def("resume", [](Mover& self, const Numbers& saved) {

@@ -105,9 +105,8 @@ Linear linear_of(const Scenario& scenario, const LinearizeOptions& options, cons
     throw io::InputError(options.scenario +
                          ": expected a state where the equations are regular, got one where they are not");
   }
-  const std::vector<std::size_t>& independent = linear.system.independent.coordinates;
-  for (const std::size_t half : {std::size_t{0}, linear.all.size() / 2}) {
-    for (const std::size_t k : independent) linear.names.push_back(linear.all[half + k]);
+  for (const Eigen::Index place : linear.system.independent.places) {
+    linear.names.push_back(linear.all[static_cast<std::size_t>(place)]);
   }
   const io::RowSlopes slopes = io::row_slopes(*subject, linear.at, linear.outputs);
   linear.c = slopes.by_state * linear.system.independent.basis;

@@ -84,7 +84,7 @@ ExitStatus run(const Scenario& scenario, const LyapunovOptions& options) {
   const std::unique_ptr<Integrator> integrator = subject->make_integrator(scenario.options);
   integrator->linearize();
   integrator->start(scenario.start);
-  const int all = 2 * (static_cast<int>(scenario.start.q.size()) - integrator->constraints());
+  const int all = 2 * static_cast<int>(scenario.start.q.size()) - integrator->conditions();
   if (const auto accuracy = scenario.places.find("accuracy"); accuracy != scenario.places.end()) {
     std::cerr << "pendula: warning: " << accuracy->second
               << ": has no effect on exponents, which go by run.tolerance\n";

@@ -249,11 +249,11 @@ pendula_status pendula_linearize(const pendula_simulation* simulation, double* a
   });
 }
 
-pendula_status pendula_independent(const pendula_simulation* simulation, int* count, int* coordinates) {
+pendula_status pendula_independent(const pendula_simulation* simulation, int* count, int* places) {
   return guarded([&] {
     const Independent found = find_independent(simulation->mover.subject(), simulation->mover.motion());
-    *count = static_cast<int>(found.coordinates.size());
-    std::ranges::transform(found.coordinates, coordinates, [](std::size_t k) { return static_cast<int>(k); });
+    *count = static_cast<int>(found.places.size());
+    std::ranges::transform(found.places, places, [](Eigen::Index k) { return static_cast<int>(k); });
     return PENDULA_OK;
   });
 }

@@ -196,12 +196,12 @@ pendula_status pendula_on_rows(pendula_simulation* simulation, double interval,
 /* Ends all rows and closes their files. pendula_simulation_free() does so, too, but reports no error. */
 pendula_status pendula_finish(pendula_simulation* simulation);
 
-/* dx/dt = A x + B inputs, linearised about the current motion, x = (independent coordinates, their rates); row by row:
- * A is (2d, 2d), B (2d, inputs). Either may be NULL. */
+/* dx/dt = A x + B inputs, linearised about the current motion, x the d independent coordinates and rates; row by row:
+ * A is (d, d), B (d, inputs). Either may be NULL. */
 pendula_status pendula_linearize(const pendula_simulation* simulation, double* a, double* b);
-/* The d coordinates from which the others follow by constraints, ascending: their number, and which they are, in room
- * for n. Without constraints all are. */
-pendula_status pendula_independent(const pendula_simulation* simulation, int* count, int* coordinates);
+/* The d coordinates and rates from which the others follow by constraints: their number, and where they are in (q, v),
+ * ascending, in room for 2n. Without constraints all are. */
+pendula_status pendula_independent(const pendula_simulation* simulation, int* count, int* places);
 
 /* --- Derivatives --- */
 

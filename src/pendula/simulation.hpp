@@ -214,20 +214,21 @@ class Simulation {
   /// Stops advances, also within long steps, when a stop is requested. Copies do not heed it.
   void heed(std::stop_token stop) { guard_->stop = std::move(stop); }
 
-  /// The coordinates from which the others follow by constraints here, d of them, ascending; without constraints all.
+  /// Where the d coordinates and rates are in (q, v) from which the others follow by constraints here, ascending; without
+  /// constraints all.
   std::vector<int> independent() const {
-    std::vector<int> found(model_.coordinates());
+    std::vector<int> found(2 * model_.coordinates());
     int count = 0;
     detail::require(pendula_independent(get(), &count, found.data()));
     found.resize(static_cast<std::size_t>(count));
     return found;
   }
 
-  /// dx/dt = A x + B inputs, x = (independent coordinates, their rates), linearised exactly about the current motion:
-  /// A is (2d x 2d), B (2d x inputs).
+  /// dx/dt = A x + B inputs, x the d independent coordinates and rates, linearised exactly about the current motion:
+  /// A is (d x d), B (d x inputs).
   std::pair<Eigen::MatrixXd, Eigen::MatrixXd> linearize() const {
     using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
-    const auto n = static_cast<Eigen::Index>(2 * independent().size());
+    const auto n = static_cast<Eigen::Index>(independent().size());
     RowMajor a(n, n), b(n, static_cast<Eigen::Index>(model_.inputs()));
     detail::require(pendula_linearize(get(), a.data(), b.data()));
     return {a, b};

@@ -81,8 +81,8 @@ class ChainSolver : public StageIterations<ChainStages<SpaceType, S, N, RealType
     return stages_.energy_defect();
   }
 
-  /// Constraints that hold the end.
-  int constraints() const { return stages_.chain().is_held() ? Space::dimension : 0; }
+  /// How many coordinates and rates follow from others where the end is held.
+  int conditions() const { return stages_.chain().is_held() ? 2 * Space::dimension : 0; }
   std::pair<double, double> constraint_errors() const { return stages_.constraint_errors(); }
 
   double accept() {

@@ -73,8 +73,8 @@ class GaussIntegrator : public PlainIntegrator {
     }
     return 0;
   }
-  int constraints() const override {
-    if constexpr (requires { stepper_.solver().constraints(); }) return stepper_.solver().constraints();
+  int conditions() const override {
+    if constexpr (requires { stepper_.solver().conditions(); }) return stepper_.solver().conditions();
     return 0;
   }
   double resolved_decay(double error) const override {

@@ -106,19 +106,14 @@ class LagrangianSolver : public StageIterations<LagrangianStages<Width, Form>> {
     return brought;
   }
 
-  /// Constraints that do not follow from others.
-  int constraints() const {
-    return stages_.is_constrained() ? static_cast<int>(stages_.constraints().independent()) : 0;
-  }
+  /// How many coordinates and rates follow from others by constraints.
+  int conditions() const { return stages_.conditions(); }
   /// How far the accepted step ended from the constraints, and their rates from 0.
   std::pair<double, double> constraint_errors() const { return stages_.constraint_errors(); }
 
   /// The derivative of the step that was solved and not yet accepted.
   using Tangent = LagrangianTangent<Width>;
-  Tangent make_tangent() const requires Form::is_symplectic {
-    require_no_constraints_of_rates(stages_.info(), "derivatives of steps: expected constraints of positions only");
-    return Tangent(stages_);
-  }
+  Tangent make_tangent() const requires Form::is_symplectic { return Tangent(stages_); }
   void linearize(Tangent& tangent) {
     if (stages_.is_constrained()) {
       complete();

@@ -362,6 +362,8 @@ class LagrangianStages : public SystemMotion<StagesInLanes<Eigen::Dynamic, doubl
   std::pair<double, double> constraint_errors() const {
     return constraints_ ? constraints_->errors() : std::pair<double, double>{};
   }
+  /// How many coordinates and rates follow from others by constraints.
+  int conditions() const { return constraints_ ? static_cast<int>(constraints_->conditions()) : 0; }
   /// Those of a system that has some.
   const StageConstraints<Width>& constraints() const { return *constraints_; }
   /// Finds what constraints lack and push where increments lead, and derivatives of that.

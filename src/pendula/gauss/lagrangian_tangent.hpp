@@ -47,8 +47,15 @@ class LagrangianTangent {
     begin_.emplace(stages.model());
     end_.emplace(stages.model());
     const Eigen::Index of = std::ssize(stages.info().constraints), s = stages.stages();
-    nodes_ = {Eigen::MatrixXd(of, s), Eigen::MatrixXd(eigen_count(), s + 1), Eigen::MatrixXd(s, s), {}};
+    nodes_.emplace();
+    nodes_->impulses.resize(of, s);
+    nodes_->places.resize(eigen_count(), s + 1);
+    nodes_->push.resize(s, s);
+    nodes_->reach.resize(s, s);
     nodes_->times.resize(system_.stages() + 1);
+    for (Eigen::Index i = 0; i < of; ++i) {
+      if (stages.info().constraint_is_of_rates[static_cast<std::size_t>(i)]) nodes_->of_rates.push_back(i);
+    }
   }
 
   int size() const { return 2 * static_cast<int>(count()); }
@@ -156,7 +163,7 @@ class LagrangianTangent {
     }
     for (std::size_t i = 0; constraints_ != nullptr && i < constraints_->count(); ++i) {
       for (std::size_t column = 0; column < count(); ++column) {
-        write(constraints_->slopes(i, column), residuals_, count() + i, index(column));
+        write(constraints_->lacking_by_start(columns_, i, column), residuals_, count() + i, index(column));
       }
     }
     state_.leftCols(K) += of_residuals_.transpose().lazyProduct(residuals_);
@@ -252,10 +259,7 @@ class LagrangianTangent {
     for (Eigen::Index node = 0; node <= stages; ++node) {
       const double* const place = nodes_->places.col(node).data();
       slopes_.evaluate_constraints(nodes_->times[static_cast<std::size_t>(node)], place, place);
-      for (Eigen::Index i = 0; node > 0 && i < slopes_.g.rows(); ++i) {
-        residuals_.row(system_.at(count() + static_cast<std::size_t>(i), static_cast<std::size_t>(node - 1))) =
-            slopes_.g.row(i);
-      }
+      for (Eigen::Index i = 0; node > 0 && i < slopes_.g.rows(); ++i) lacking_at(i, node - 1) = slopes_.g.row(i);
       if (node == stages) break;
       const Eigen::MatrixXd turned = slopes_.turned(nodes_->impulses.col(node));
       of_parameters_.bottomRows(K) += turned;
@@ -266,6 +270,21 @@ class LagrangianTangent {
         }
       }
     }
+    add_constraints_of_rates_by_parameters();
+  }
+  void add_constraints_of_rates_by_parameters() {
+    if (nodes_->of_rates.empty()) return;
+    for (std::size_t j = 0; j < system_.stages(); ++j) {
+      slopes_.evaluate_constraints(times_[j], jacobians_.q() + j, jacobians_.v() + j, static_cast<std::size_t>(Width));
+      for (const Eigen::Index i : nodes_->of_rates) {
+        for (Eigen::Index node = 0; node < index(system_.stages()); ++node) {
+          lacking_at(i, node) += nodes_->reach(node, index(j)) * columns_.hb(j) * slopes_.g_dot.row(i);
+        }
+      }
+    }
+  }
+  auto lacking_at(Eigen::Index constraint, Eigen::Index stage) {
+    return residuals_.row(system_.at(count() + static_cast<std::size_t>(constraint), static_cast<std::size_t>(stage)));
   }
 
   // y += A x, row by row. A row has one number for each direction.
@@ -307,11 +326,12 @@ class LagrangianTangent {
   bool has_state_ = false;
   bool has_parameters_ = false;
 
-  /// Constraints at the nodes of the step: impulses (constraints x s) at 0 … s − 1, coordinates and times at 0 … s, and
-  /// what a push at each node adds to momenta at the stages (s x s).
+  /// Constraints at the nodes of the step: impulses (constraints x s) at 0 … s − 1, coordinates and times at 0 … s;
+  /// what a push at each node adds to momenta at the stages (s x s); how far stages reach to the nodes 1 … s (s x s).
   struct Nodes {
-    Eigen::MatrixXd impulses, places, push;
+    Eigen::MatrixXd impulses, places, push, reach;
     std::vector<double> times;
+    std::vector<Eigen::Index> of_rates;  // which constraints are
 
     void see(const StageConstraints<Width>& constraints, const Eigen::VectorXd& start) {
       const Eigen::Index stages = push.cols();
@@ -327,7 +347,10 @@ class LagrangianTangent {
         }
         alignas(pack_alignment) typename Stages::Stored added;
         constraints.push(at).store(added);
-        for (Eigen::Index i = 0; i < stages; ++i) push(i, node) = added[i];
+        for (Eigen::Index i = 0; i < stages; ++i) {
+          push(i, node) = added[i];
+          reach(node, i) = constraints.reach(static_cast<std::size_t>(i), at + 1);
+        }
       }
     }
   };

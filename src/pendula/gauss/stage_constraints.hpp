@@ -79,8 +79,11 @@ class StageConstraints {
   }
 
   std::size_t count() const { return count_; }
-  /// How many do not follow from others, where it looked last.
-  std::size_t independent() const { return start_.independent(); }
+  /// How many coordinates and rates follow from others by them, where a step began last.
+  std::size_t conditions() {
+    std::vector<double> inverse(count_ * count_);
+    return start_.find_inverse_of_positions(inverse.data()) + start_.independent();
+  }
 
   /// Adds to accelerations what constraints bring in a state.
   void accelerate(double time, const double* q, const double* v, double* a) {
@@ -213,7 +216,16 @@ class StageConstraints {
   double slope(std::size_t node, std::size_t i, std::size_t k) const {
     return node == 0 ? start_.slope(i, k) : slopes_[i * coordinates_ + k][node - 1];
   }
-  L slopes(std::size_t i, std::size_t k) const { return L::load(slopes_[i * coordinates_ + k]); }
+  /// What constraint i lacks at the nodes 1 … s, by coordinate k at the start, which moves all stages and nodes.
+  L lacking_by_start(const Columns& columns, std::size_t i, std::size_t k) const {
+    const std::size_t at = i * coordinates_ + k;
+    if (!is_of_rates(i)) return L::load(slopes_[at]);
+    alignas(pack_alignment) double numbers[width] = {};
+    for (std::size_t j = 0; j < nodes_.stages(); ++j) numbers[j] = columns.hb(j) * stage_by_place_[at][j];
+    return nodes_.reached(numbers, L(0.0));
+  }
+  /// How far an increment of stage j moves a node from 1 on.
+  double reach(std::size_t j, std::size_t node) const { return nodes_.reach(j, node); }
 
   /// What rounding of coordinates, by way of the constraints, makes of increments; as changes are weighed.
   double rounding() const { return rounding_; }
@@ -281,7 +293,7 @@ class StageConstraints {
     start_.stop(here_, q, v, first_.data());
     for (std::size_t i = 0; i < count_; ++i) {
       double speed = at_rest * size(i, q);
-      const double fastest = is_of_rates(i) ? at_rest * fastest_of(v) : 0;
+      const double fastest = at_rest * fastest_of(v);  // which leaves its rounding in the others
       for (std::size_t k = 0; k < coordinates_; ++k) speed += std::abs(start_.slope(i, k)) * (std::abs(v[k]) + fastest);
       require(i, "0", start_.value(i), size(i, q));
       require(i, "a rate of 0", start_.rate(i), speed);

@@ -117,10 +117,8 @@ class Assembly {
     start_.v += change;
     const Eigen::VectorXd left = rates_of(start_.v);
     for (Eigen::Index i = 0; i < left.size(); ++i) {
-      double size = slopes_.row(i).transpose().cwiseProduct(start_.v).cwiseAbs().sum() + at_rest * size_of(i);
-      if (info_.constraint_is_of_rates[static_cast<std::size_t>(i)]) {
-        size += at_rest * slopes_.row(i).cwiseAbs().sum() * start_.v.cwiseAbs().maxCoeff();
-      }
+      const double size = slopes_.row(i).transpose().cwiseProduct(start_.v).cwiseAbs().sum() +
+                          at_rest * (size_of(i) + slopes_.row(i).cwiseAbs().sum() * start_.v.cwiseAbs().maxCoeff());
       if (!(std::abs(left[i]) <= enough * size) && left[i] != 0) return left_over("rate of ", left);
     }
     return "";

@@ -121,7 +121,7 @@ class HeldInputs : public Relay {
     return rows_ = now().linearize();
   }
   int parameters() override { return now().parameters(); }
-  int constraints() const override { return now().constraints(); }
+  int conditions() const override { return now().conditions(); }
   double resolved_decay(double error) const override { return now().resolved_decay(error); }
   void push(double* tangents, int count, const double* parameters) override {
     Eigen::Map<Directions<>> given(tangents, rows_, count);

@@ -117,9 +117,8 @@ class Integrator : public StepView {
         "ten coordinates; other steps have no derivative");
   }
 
-  /// Constraints that do not follow from others in the state: each takes a coordinate and a rate from the motions that
-  /// there are nearby.
-  int constraints() const { return integrator_->constraints(); }
+  /// How many coordinates and rates of the state follow from others by constraints.
+  int conditions() const { return integrator_->conditions(); }
 
   /// The largest z for which a step multiplies a tangent that decays as e^(−z) correctly to `error` in z; valid after
   /// linearize().

@@ -10,7 +10,6 @@
 #include <pendula/run/linearize.hpp>
 #include <pendula/run/subject_kinds.hpp>
 #include <pendula/system/constraint_forces.hpp>
-#include <pendula/system/no_constraints.hpp>
 #include <pendula/system/parameter_slopes.hpp>
 #include <pendula/system/state_slopes.hpp>
 #include <pendula/system/system_model.hpp>
@@ -88,9 +87,9 @@ std::vector<bool> dependent(Eigen::MatrixXd slopes, const Directions<>& masses, 
 }
 
 Independent all_of(Eigen::Index n) {
-  std::vector<std::size_t> numbers(static_cast<std::size_t>(n));
-  std::iota(numbers.begin(), numbers.end(), std::size_t{0});
-  return {.coordinates = numbers, .basis = Directions<>::Identity(2 * n, 2 * n)};
+  std::vector<Eigen::Index> places(static_cast<std::size_t>(2 * n));
+  std::iota(places.begin(), places.end(), Eigen::Index{0});
+  return {.places = places, .basis = Directions<>::Identity(2 * n, 2 * n)};
 }
 
 /// Constraints at one motion: forces that keep them, and how they change.
@@ -101,6 +100,7 @@ class ConstraintsBeside {
         m_(std::ssize(model.info().constraints)),
         forces_(model.info()),
         beside_(beside),
+        of_rates_(model.info().constraint_is_of_rates.begin(), model.info().constraint_is_of_rates.end()),
         slope_(m_, n_),
         resisting_(n_, m_) {
     if (m_ == 0) return;
@@ -121,27 +121,17 @@ class ConstraintsBeside {
 
   Independent independent(const Motion& motion) {
     if (m_ == 0) return all_of(n_);
-    const std::vector<bool> follows =
-        dependent(slope_, beside_.masses(), static_cast<Eigen::Index>(forces_.independent()));
-    Independent found;
-    std::vector<Eigen::Index> others;
-    for (std::size_t k = 0; k < follows.size(); ++k) {
-      if (follows[k]) others.push_back(static_cast<Eigen::Index>(k));
-      if (!follows[k]) found.coordinates.push_back(k);
-    }
-    const Eigen::Index d = std::ssize(found.coordinates);
-    const Eigen::MatrixXd kept = slope_(Eigen::all, found.coordinates);
-    const Eigen::ColPivHouseholderQR<Eigen::MatrixXd> factors(Eigen::MatrixXd(slope_(Eigen::all, others)));
-    const Eigen::MatrixXd following = -factors.solve(kept);
-    Eigen::MatrixXd places = Eigen::MatrixXd::Zero(n_, d);
-    places(found.coordinates, Eigen::all).setIdentity();
-    places(others, Eigen::all) = following;
-    const Eigen::MatrixXd turned = beside_.constraint_rates(motion.v).first.leftCols(n_) * places;
-    found.basis = Directions<>::Zero(2 * n_, 2 * d);
-    found.basis.topLeftCorner(n_, d) = found.basis.bottomRightCorner(n_, d) = places;
-    Eigen::MatrixXd rates = Eigen::MatrixXd::Zero(n_, d);
-    rates(others, Eigen::all) = -factors.solve(turned);
-    found.basis.bottomLeftCorner(n_, d) = rates;
+    std::vector<double> unused(static_cast<std::size_t>(m_ * m_));
+    const Along places = along(slope_of_positions(), forces_.find_inverse_of_positions(unused.data()));
+    const Along rates = along(slope_, forces_.independent());
+    const Eigen::Index of_places = places.changes.cols(), of_rates = rates.changes.cols();
+    Independent found{.places = places.free, .basis = Directions<>::Zero(2 * n_, of_places + of_rates)};
+    for (const Eigen::Index k : rates.free) found.places.push_back(n_ + k);
+    found.basis.topLeftCorner(n_, of_places) = places.changes;
+    found.basis.bottomRightCorner(n_, of_rates) = rates.changes;
+    if (rates.others.empty()) return found;
+    const Eigen::MatrixXd turned = beside_.constraint_rates(motion.v).first.leftCols(n_) * places.changes;
+    found.basis.bottomLeftCorner(n_, of_places)(rates.others, Eigen::all) = -rates.factors.solve(turned);
     return found;
   }
 
@@ -166,6 +156,35 @@ class ConstraintsBeside {
   }
 
  private:
+  /// Changes that keep constraints, by those of some coordinates, which are free; the others follow  (n x free).
+  struct Along {
+    std::vector<Eigen::Index> free, others;
+    Eigen::ColPivHouseholderQR<Eigen::MatrixXd> factors;  // of the slopes by the others
+    Eigen::MatrixXd changes;
+  };
+  Along along(const Eigen::MatrixXd& slope, std::size_t independent) const {
+    const std::vector<bool> follows = dependent(slope, beside_.masses(), static_cast<Eigen::Index>(independent));
+    Along found;
+    for (std::size_t k = 0; k < follows.size(); ++k) {
+      (follows[k] ? found.others : found.free).push_back(static_cast<Eigen::Index>(k));
+    }
+    found.changes = Eigen::MatrixXd::Zero(n_, std::ssize(found.free));
+    found.changes(found.free, Eigen::all).setIdentity();
+    if (found.others.empty()) return found;
+    found.factors.compute(Eigen::MatrixXd(slope(Eigen::all, found.others)));
+    found.changes(found.others, Eigen::all) = -found.factors.solve(Eigen::MatrixXd(slope(Eigen::all, found.free)));
+    return found;
+  }
+
+  /// Constraints of rates do not bind coordinates.
+  Eigen::MatrixXd slope_of_positions() const {
+    Eigen::MatrixXd slope = slope_;
+    for (Eigen::Index i = 0; i < m_; ++i) {
+      if (of_rates_[static_cast<std::size_t>(i)]) slope.row(i).setZero();
+    }
+    return slope;
+  }
+
   /// Accelerations without constraints, and λ.
   std::pair<Eigen::VectorXd, Eigen::VectorXd> pull(const Motion& motion) {
     Eigen::VectorXd free(n_), lambda(m_);
@@ -184,6 +203,7 @@ class ConstraintsBeside {
   Eigen::Index n_, m_;
   ConstraintForces forces_;
   Beside& beside_;
+  std::vector<bool> of_rates_;
   Eigen::MatrixXd slope_, resisting_;  // G, M⁻¹ Gᵀ K⁻¹
 };
 
@@ -201,7 +221,9 @@ bool changes_with_time(const Subject& subject) {
 /// Brings coordinates that follow from others back onto the constraints. Returns whether that is done.
 bool bring_back_others(const Subject& subject, const Independent& independent, Motion& motion) {
   std::vector<bool> follow(static_cast<std::size_t>(motion.q.size()), true);
-  for (const std::size_t k : independent.coordinates) follow[k] = false;
+  for (const Eigen::Index k : independent.places) {
+    if (k < motion.q.size()) follow[static_cast<std::size_t>(k)] = false;
+  }
   return as_its_kind(subject, [&](const auto& kind) {
     if constexpr (requires { kind.info(); }) return bring_back(kind, follow, motion).empty();
     return true;
@@ -210,24 +232,30 @@ bool bring_back_others(const Subject& subject, const Independent& independent, M
 
 SystemModel regular_model(const Subject& subject, const Motion& motion) {
   require_regular(subject, motion);
-  const SystemModel model =
-      as_its_kind_at(subject, motion.time, [&](const auto& kind) { return system_model_of(kind, motion); });
-  require_no_constraints_of_rates(model.info(), "linearization: expected constraints of positions only");
-  return model;
+  return as_its_kind_at(subject, motion.time, [&](const auto& kind) { return system_model_of(kind, motion); });
+}
+
+/// Scales rows and columns, by powers of 2, until those of a number are of one size: units of x cost eigenvalues no
+/// digits (Osborne, J. ACM 7, 1960).
+void balance(Eigen::MatrixXd& a) {
+  constexpr int most = 100;
+  bool changed = a.allFinite();
+  for (int sweep = 0; changed && sweep < most; ++sweep) {
+    changed = false;
+    for (Eigen::Index k = 0; k < a.rows(); ++k) {
+      const double own = std::abs(a(k, k));
+      const double row = a.row(k).lpNorm<1>() - own, column = a.col(k).lpNorm<1>() - own;
+      if (!(row > 0) || !(column > 0)) continue;
+      const double scale = std::exp2(std::round(std::log2(row / column) / 2));
+      if (!(row / scale + column * scale < 0.95 * (row + column))) continue;
+      a.row(k) /= scale;
+      a.col(k) *= scale;
+      changed = true;
+    }
+  }
 }
 
 }  // namespace
-
-Directions<> Independent::rows(const Directions<>& of_all) const {
-  const Eigen::Index d = std::ssize(coordinates), n = of_all.rows() / 2;
-  Directions<> found(2 * d, of_all.cols());
-  for (Eigen::Index k = 0; k < d; ++k) {
-    const auto place = static_cast<Eigen::Index>(coordinates[static_cast<std::size_t>(k)]);
-    found.row(k) = of_all.row(place);
-    found.row(d + k) = of_all.row(n + place);
-  }
-  return found;
-}
 
 Independent find_independent(const Subject& subject, const Motion& motion) {
   const bool has_constraints = as_its_kind_at(subject, motion.time, [](const auto& kind) {
@@ -266,7 +294,9 @@ Linearized linearize(const Subject& subject, const Motion& motion) {
 }
 
 Eigen::VectorXcd eigenvalues(const Directions<>& a) {
-  return Eigen::MatrixXd(a).eigenvalues();
+  Eigen::MatrixXd balanced = a;
+  balance(balanced);
+  return balanced.eigenvalues();
 }
 
 Motion equilibrium(const Subject& subject, const Motion& near) {
@@ -282,10 +312,12 @@ Motion equilibrium(const Subject& subject, const Motion& near) {
     Beside beside(model, at);
     ConstraintsBeside constraints(model, at, beside);
     const Independent independent = constraints.independent(at);
-    const Eigen::Index d = std::ssize(independent.coordinates);
+    const auto d = static_cast<Eigen::Index>(
+        std::ranges::count_if(independent.places, [&](Eigen::Index place) { return place < n; }));
     const Eigen::MatrixXd along = independent.basis.topLeftCorner(n, d);
-    const Eigen::VectorXd force = along.transpose() * beside.forces(at.v).f;
-    const Eigen::MatrixXd stiffness = -along.transpose() * constraints.stiffness(at) * along;
+    const Eigen::MatrixXd free = independent.basis.bottomRightCorner(n, independent.basis.cols() - d);
+    const Eigen::VectorXd force = free.transpose() * beside.forces(at.v).f;
+    const Eigen::MatrixXd stiffness = -free.transpose() * constraints.stiffness(at) * along;
     if (!force.allFinite() || !stiffness.allFinite()) break;
     Eigen::VectorXd change = along * stiffness.completeOrthogonalDecomposition().solve(force);
     const double size = change.cwiseAbs().maxCoeff(), scale = std::max(1.0, at.q.cwiseAbs().maxCoeff());

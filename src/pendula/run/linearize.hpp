@@ -1,7 +1,6 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <cstddef>
 #include <pendula/numeric/directions.hpp>
 #include <pendula/run/subject.hpp>
 #include <pendula/system/motion.hpp>
@@ -9,23 +8,23 @@
 
 namespace pendula {
 
-/// Coordinates from which the others follow by constraints, beside a motion; without constraints all of them. They are
-/// the first ones of a system from which others follow well. With x = (these coordinates, their rates),
+/// Coordinates and rates from which the others follow by constraints, beside a motion; without constraints all of them.
+/// They are the first ones of a system from which others follow well. With x those of them,
 ///   (δq, δv) = basis δx.
 struct Independent {
-  std::vector<std::size_t> coordinates;  ///< ascending, of the system's
-  Directions<> basis;                    ///< (2n x 2d), d of them
+  std::vector<Eigen::Index> places;  ///< ascending, in (q, v)
+  Directions<> basis;                ///< (2n x d), d of them
 
   /// Those of the rows of a matrix (2n x any) that are of x.
-  Directions<> rows(const Directions<>& of_all) const;
+  Directions<> rows(const Directions<>& of_all) const { return of_all(places, Eigen::all); }
 };
 
 Independent find_independent(const Subject& subject, const Motion& motion);
 
-/// The linearisation at a motion: dx/dt = A x + B inputs, in deviations x of independent coordinates and their rates.
+/// The linearisation at a motion: dx/dt = A x + B inputs, in deviations x of independent coordinates and rates.
 struct Linearized {
   Independent independent;
-  Directions<> a, b;  ///< (2d x 2d), (2d x inputs)
+  Directions<> a, b;  ///< (d x d), (d x inputs)
 };
 
 /// It is exact, by the kernel's derivatives. Throws NoKernel for a chain without one, std::invalid_argument where the

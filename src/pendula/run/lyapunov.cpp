@@ -92,7 +92,7 @@ std::optional<TangentScale> tangent_scale(Integrator& integrator, const Motion& 
     return true;
   };
   if (!goes()) return {};
-  if (integrator.constraints() > 0) {  // their impulses are rounding in a tiny step
+  if (integrator.conditions() > 0) {  // their impulses are rounding in a tiny step
     constexpr double part = 1e-4;
     const double rate = std::sqrt(std::max(turning * turning, pushed));
     h = rate * duration > part ? part / rate : duration;
@@ -121,7 +121,7 @@ std::optional<TangentScale> tangent_scale(Integrator& integrator, const Motion& 
   for (Eigen::Index first = 0; first < half; first += group) {
     mobility.segment(first, group).setConstant(mobility.segment(first, group).maxCoeff());
   }
-  const Eigen::Index together = integrator.constraints() > 0 ? half : group;
+  const Eigen::Index together = integrator.conditions() > 0 ? half : group;
   for (Eigen::Index first = 0; first < half; first += together) {
     const double sum = kept.segment(first, together).sum(), whole = std::max(1.0, std::round(sum));
     loss = std::max(loss, std::abs(whole - sum) / (whole * h));
@@ -229,7 +229,7 @@ LyapunovRun find_lyapunov_spectrum(Integrator& integrator, const Motion& start, 
                                    const std::function<void(const LyapunovProgress&)>& on_way,
                                    const std::function<bool()>& stop) {
   integrator.start(start);
-  const int all = 2 * (static_cast<int>(start.q.size()) - integrator.constraints());
+  const int all = 2 * static_cast<int>(start.q.size()) - integrator.conditions();
   if (count < 0 || count > all) {
     throw std::invalid_argument("count: expected 1 to " + std::to_string(all) + " exponents, got " +
                                 std::to_string(count));

@@ -1,6 +1,9 @@
 #pragma once
 
+#include <Eigen/Core>
+#include <algorithm>
 #include <cstddef>
+#include <functional>
 #include <pendula/numeric/general_inverse.hpp>
 #include <pendula/numeric/linear_system.hpp>
 #include <pendula/system/system_model.hpp>
@@ -26,6 +29,7 @@ class ConstraintForces {
         moving_(coordinates_),
         by_place_(slopes_),
         at_rest_(slopes_),
+        is_of_rates_(info.constraint_is_of_rates.begin(), info.constraint_is_of_rates.end()),
         masses_(static_cast<Eigen::Index>(coordinates_)),
         softness_(static_cast<Eigen::Index>(count_)) {}
 
@@ -55,6 +59,24 @@ class ConstraintForces {
   double slope(std::size_t i, std::size_t k) const { return slopes_[i * coordinates_ + k]; }
   double moved(std::size_t i, std::size_t k) const { return moved_[i * coordinates_ + k]; }
   double inverse(std::size_t i, std::size_t j) const { return inverse_[i * count_ + j]; }
+
+  /// K⁻¹ of the constraints of positions among them, 0 in rows and columns of others, (count x count). Returns how many
+  /// of them do not follow from others.
+  std::size_t find_inverse_of_positions(double* found) {
+    if (std::ranges::none_of(is_of_rates_, std::identity())) {
+      std::ranges::copy(inverse_, found);
+      return independent_;
+    }
+    const Eigen::MatrixXd all = softness_.matrix;
+    for (std::size_t i = 0; i < count_; ++i) {
+      if (!is_of_rates_[i]) continue;
+      softness_.matrix.row(static_cast<Eigen::Index>(i)).setZero();
+      softness_.matrix.col(static_cast<Eigen::Index>(i)).setZero();
+    }
+    const auto independent = static_cast<std::size_t>(softness_.find(found));
+    softness_.matrix = all;
+    return independent;
+  }
 
   /// λ in the state q, v, where look was called.
   void find(const SystemAt<1>& here, const double* q, const double* v, const double* a, double* lambda) {
@@ -118,6 +140,7 @@ class ConstraintForces {
   std::vector<double> inverse_;  // of K
   std::vector<double> rates_, second_, moving_;
   std::vector<double> by_place_, at_rest_;  // ∂(dg/dt)/∂q
+  std::vector<bool> is_of_rates_;
   LinearSystem masses_;
   GeneralInverse softness_;
   std::size_t independent_ = 0;

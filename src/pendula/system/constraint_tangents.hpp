@@ -14,6 +14,7 @@ namespace pendula {
 /// Brings tangents (δq, δp) of a system at one state onto its constraints, by the least change of coordinates, as
 /// masses weigh it, and by a change of momenta along Gᵀ, G = ∂g/∂q:
 ///   G δq = 0,  G δv + (∂(dg/dt)/∂q) δq = 0,  where δp = ∂p/∂q δq + M δv + ∂p/∂θ δθ.
+/// Constraints of rates say the second alone (ConstraintForces).
 class ConstraintTangents {
  public:
   explicit ConstraintTangents(const SystemModel& model)
@@ -34,7 +35,7 @@ class ConstraintTangents {
     curvature_.setZero();
     impulses_.resize(0);
     find();
-    const Directions<> along = Directions<>::Identity(n_, n_) - moved_.transpose() * (inverse_ * slope_);
+    const Directions<> along = Directions<>::Identity(n_, n_) - moved_.transpose() * (of_positions_ * slope_);
     whole_.topLeftCorner(n_, n_) = along;
     whole_.bottomLeftCorner(n_, n_) = turning_ * along;
   }
@@ -67,7 +68,7 @@ class ConstraintTangents {
       const Directions<> turned = slopes_.turned(impulses_);
       found.bottomRows(n_) += turned - pushed_ * turned;
     } else {
-      found.topRows(n_) = -moved_.transpose() * (inverse_ * slopes_.g);
+      found.topRows(n_) = -moved_.transpose() * (of_positions_ * slopes_.g);
       found.bottomRows(n_) += turning_ * found.topRows(n_);
     }
     return found;
@@ -94,6 +95,8 @@ class ConstraintTangents {
       }
       for (Eigen::Index j = 0; j < m_; ++j) inverse_(i, j) = forces_.inverse(row, static_cast<std::size_t>(j));
     }
+    of_positions_.resize(m_, m_);
+    forces_.find_inverse_of_positions(of_positions_.data());
     Directions<> p_D_q(n_, n_), p_D_v(n_, n_), f_D_q(n_, n_), f_D_v(n_, n_);
     Eigen::VectorXd p(n_), f(n_);
     const Directions<> rates = by_state_.constraint_rates(time_, q_.data(), v_.data()).first.leftCols(n_);
@@ -114,7 +117,7 @@ class ConstraintTangents {
   StateSlopes by_state_;
   double time_ = 0;
   Eigen::VectorXd q_, v_, impulses_;
-  Directions<> slope_, moved_, inverse_;  // G, G M⁻¹, K⁻¹
+  Directions<> slope_, moved_, inverse_, of_positions_;  // G, G M⁻¹, K⁻¹, that of constraints of positions alone
   Directions<> resisted_, pushed_, turning_;  // Gᵀ K⁻¹, Gᵀ K⁻¹ G M⁻¹, what δq on the constraints brings to δp
   Directions<> curvature_, whole_;
 };

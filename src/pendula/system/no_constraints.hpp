@@ -1,6 +1,5 @@
 #pragma once
 
-#include <cstddef>
 #include <pendula/system/plain_system.hpp>
 #include <stdexcept>
 #include <string>
@@ -14,15 +13,6 @@ inline void require_no_constraints(const SystemInfo& info, const std::string& wh
   const std::string more = info.constraints.size() > 1 ? ", ..." : "";
   throw std::invalid_argument(what + ", for a system with constraints (" + std::string(info.constraints.front()) +
                               more + ")");
-}
-
-/// The same for constraints of rates.
-inline void require_no_constraints_of_rates(const SystemInfo& info, const std::string& what) {
-  for (std::size_t i = 0; i < info.constraint_is_of_rates.size(); ++i) {
-    if (!info.constraint_is_of_rates[i]) continue;
-    throw std::invalid_argument(what + ", for a system with constraints of rates (" + std::string(info.constraints[i]) +
-                                ")");
-  }
 }
 
 }  // namespace pendula

@@ -30,7 +30,7 @@ class ParameterSlopes {
   Eigen::MatrixXd p, f;             ///< ∂p/∂θ, ∂f/∂θ at given q and v, a column a parameter or input
   Eigen::MatrixXd g, g_D_q, g_dot;  ///< the same of constraints, of ∂g/∂q row by row, and of dg/dt
 
-  /// Computes p and f. q, v: (coordinates) numbers, each `apart` numbers after the one before.
+  /// Computes p and f. Here and below q, v: (coordinates) numbers, each `apart` numbers after the one before.
   void evaluate(double time, const double* q, const double* v, std::size_t apart = 1) {
     const auto count = static_cast<std::size_t>(p.rows());
     vary(time, q, v, apart, [&](auto take) {
@@ -42,9 +42,9 @@ class ParameterSlopes {
   }
 
   /// Computes g, g_D_q and g_dot.
-  void evaluate_constraints(double time, const double* q, const double* v) {
+  void evaluate_constraints(double time, const double* q, const double* v, std::size_t apart = 1) {
     const auto count = static_cast<std::size_t>(p.rows()), constraints = static_cast<std::size_t>(g.rows());
-    vary(time, q, v, 1, [&](auto take) {
+    vary(time, q, v, apart, [&](auto take) {
       at_(&SystemFunctions::constraints_along, varied_[0], numbers_[0], found_[0], found_[2 * constraints]);
       take(g, found_, 0);
       take(g_D_q, found_, 2 * constraints);

@@ -60,8 +60,8 @@ class PlainIntegrator {
   /// generated kernel (δq, δp).
   virtual int linearize() { return 0; }
 
-  /// Constraints that do not follow from others in the state.
-  virtual int constraints() const { return 0; }
+  /// How many coordinates and rates of the state follow from others by constraints.
+  virtual int conditions() const { return 0; }
 
   /// The largest z for which a step multiplies a tangent that decays as e^(−z) correctly to `error` in z. For methods
   /// with a derivative.
