@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections import Counter, defaultdict
 from collections.abc import Sequence
 from dataclasses import replace
+from heapq import heappop, heappush
 
 from pendula_codegen.linear_solve import UNROLLED
 from pendula_codegen.table import TableFunction
@@ -128,6 +129,7 @@ class _Registers:
         self.of: dict[Value, int] = {}
         self.count = 0
         self._free: set[int] = set()
+        self._lowest: list[int] = []  # a heap that has all free ones, and some that are not free any more
         last = {value: step for step in steps for value in step.operands}
         for step in steps:
             over = {value for value in step.operands if last[value] is step} - kept
@@ -142,7 +144,9 @@ class _Registers:
             self._release({*step.results} - last.keys() - kept)
 
     def _release(self, values: set[Value]) -> None:
-        self._free.update(self.of[value] for value in values)
+        for register in (self.of[value] for value in values):
+            self._free.add(register)
+            heappush(self._lowest, register)
 
     def _take(self, values: Sequence[Value]) -> None:
         """Assigns consecutive registers."""
@@ -153,5 +157,9 @@ class _Registers:
 
     def _first_of(self, count: int) -> int:
         """The first of `count` consecutive free registers."""
+        if count == 1:
+            while self._lowest and self._lowest[0] not in self._free:
+                heappop(self._lowest)
+            return self._lowest[0] if self._lowest else self.count
         free = {*self._free, *range(self.count, self.count + count)}
         return next(k for k in sorted(free) if all(k + j in free for j in range(count)))
