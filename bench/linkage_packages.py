@@ -8,12 +8,11 @@ from collections.abc import Callable
 import numpy as np
 from linkage_problems import DURATION, GRAVITY, Problem
 
-Run = Callable[
-    [Problem, dict], tuple[np.ndarray, float]
-]  # a setting -> where the joint ends, seconds of stepping
+# A setting -> where the joint ends, seconds of stepping.
+Run = Callable[[Problem, dict], tuple[np.ndarray, float]]
 
 
-class Failed(Exception):
+class RunError(Exception):
     """A run that did not get to its end."""
 
 
@@ -21,7 +20,7 @@ def by_exudyn() -> Run:
     """Rigid bodies in the plane with revolute joints, in its module without range checks."""
     sys.exudynFast = True
     import exudyn as exu
-    from exudyn import itemInterface as items
+    import exudyn.utilities as items
 
     exu.SetWriteToConsole(False)
 
@@ -30,52 +29,26 @@ def by_exudyn() -> Run:
         mbs = system.AddSystem()
 
         def marker(body: int, x: float, y: float) -> int:
-            return mbs.AddMarker(
-                items.MarkerBodyPosition(bodyNumber=body, localPosition=[x, y, 0])
-            )
+            return mbs.AddMarker(items.MarkerBodyPosition(bodyNumber=body, localPosition=[x, y, 0]))
 
         ground = mbs.AddObject(items.ObjectGround())
-        holders = {
-            -1 - k: marker(ground, *place) for k, place in enumerate(problem.fixed)
-        }
+        holders = {-1 - k: marker(ground, *place) for k, place in enumerate(problem.fixed)}
         for k, bar in enumerate(problem.bars):
             a, b = problem.place(bar.a), problem.place(bar.b)
-            middle, inertia = (
-                (problem.speed(bar.a) + problem.speed(bar.b)) / 2,
-                bar.mass * bar.length**2 / 12,
-            )
-            reference, rates = (
-                [*(a + b) / 2, math.atan2(*(b - a)[::-1])],
-                [*middle, problem.turning(k)],
-            )
-            node = mbs.AddNode(
-                items.NodeRigidBody2D(
-                    referenceCoordinates=reference, initialVelocities=rates
-                )
-            )
-            rigid = items.ObjectRigidBody2D(
-                mass=bar.mass, inertia=inertia, nodeNumber=node
-            )
+            reference = [*(a + b) / 2, math.atan2(*(b - a)[::-1])]
+            rates = [*(problem.speed(bar.a) + problem.speed(bar.b)) / 2, problem.turning(k)]
+            inertia = bar.mass * bar.length**2 / 12
+            node = mbs.AddNode(items.NodeRigidBody2D(referenceCoordinates=reference, initialVelocities=rates))
+            rigid = items.ObjectRigidBody2D(mass=bar.mass, inertia=inertia, nodeNumber=node)
             body = mbs.AddObject(rigid)
             mass = mbs.AddMarker(items.MarkerBodyMass(bodyNumber=body))
-            mbs.AddLoad(
-                items.LoadMassProportional(
-                    markerNumber=mass, loadVector=[0, -GRAVITY, 0]
-                )
-            )
+            mbs.AddLoad(items.LoadMassProportional(markerNumber=mass, loadVector=[0, -GRAVITY, 0]))
             for joint, side in ((bar.a, -1), (bar.b, 1)):
                 end = marker(body, side * bar.length / 2, 0)
                 if holders.setdefault(joint, end) != end:
-                    mbs.AddObject(
-                        items.ObjectJointRevolute2D(markerNumbers=[holders[joint], end])
-                    )
-        place = {
-            "outputVariableType": exu.OutputVariableType.Position,
-            "writeToFile": False,
-        }
-        watch = mbs.AddSensor(
-            items.SensorMarker(markerNumber=holders[problem.watched], **place)
-        )
+                    mbs.AddObject(items.ObjectJointRevolute2D(markerNumbers=[holders[joint], end]))
+        place = {"outputVariableType": exu.OutputVariableType.Position, "writeToFile": False}
+        watch = mbs.AddSensor(items.SensorMarker(markerNumber=holders[problem.watched], **place))
         mbs.Assemble()
         return system, mbs, watch
 
@@ -85,12 +58,8 @@ def by_exudyn() -> Run:
         integration = chosen.timeIntegration
         integration.endTime, integration.numberOfSteps = DURATION, settings["steps"]
         integration.adaptiveStep = False
-        integration.newton.useModifiedNewton = (
-            False  # which fails earlier at singular positions
-        )
-        integration.newton.relativeTolerance = integration.newton.absoluteTolerance = (
-            settings["newton"]
-        )
+        integration.newton.useModifiedNewton = False  # which fails earlier at singular positions
+        integration.newton.relativeTolerance = integration.newton.absoluteTolerance = settings["newton"]
         chosen.solution.file.write = False
         chosen.solution.sensors.writePeriod = DURATION
         solver = getattr(exu.DynamicSolverType, settings["solver"])
@@ -98,7 +67,7 @@ def by_exudyn() -> Run:
         try:
             mbs.SolveDynamic(chosen, solverType=solver)
         except exu.SolverError as error:
-            raise Failed("its solver stopped") from error
+            raise RunError("its solver stopped") from error
         seconds = time.perf_counter() - begin
         return np.array(mbs.GetSensorValues(watch)[:2]), seconds
 
@@ -109,12 +78,7 @@ def by_drake() -> Run:
     """A tree of hinges closed by ball constraints, which it has in discrete mode alone, with its solver SAP."""
     from pydrake.math import RigidTransform
     from pydrake.multibody.plant import DiscreteContactApproximation, MultibodyPlant
-    from pydrake.multibody.tree import (
-        FixedOffsetFrame,
-        RevoluteJoint,
-        RotationalInertia,
-        SpatialInertia,
-    )
+    from pydrake.multibody.tree import FixedOffsetFrame, RevoluteJoint, RotationalInertia, SpatialInertia
     from pydrake.systems.analysis import Simulator
 
     def run(problem: Problem, settings: dict) -> tuple[np.ndarray, float]:
@@ -128,24 +92,14 @@ def by_drake() -> Run:
 
         for k, bar, holder, closing in problem.tree():
             inertia = RotationalInertia(*[bar.mass * bar.length**2 / 12] * 3)
-            mass = SpatialInertia.MakeFromCentralInertia(
-                bar.mass, spot(k, bar.b) / 2, inertia
-            )
+            mass = SpatialInertia.MakeFromCentralInertia(bar.mass, spot(k, bar.b) / 2, inertia)
             bodies[k] = plant.AddRigidBody(f"bar_{k}", mass)
-            there = FixedOffsetFrame(
-                f"at_{k}", bodies[holder], RigidTransform(spot(holder, bar.a))
-            )
+            there = FixedOffsetFrame(f"at_{k}", bodies[holder], RigidTransform(spot(holder, bar.a)))
             here = bodies[k].body_frame()
-            hinge = plant.AddJoint(
-                RevoluteJoint(f"hinge_{k}", plant.AddFrame(there), here, [0, 0, 1])
-            )
+            hinge = plant.AddJoint(RevoluteJoint(f"hinge_{k}", plant.AddFrame(there), here, [0, 0, 1]))
             hinges.append((hinge, problem.turning(k) - problem.turning(holder)))
-            if (
-                closing is not None
-            ):  # to a bar: to the ground it ends with a segmentation fault
-                plant.AddBallConstraint(
-                    bodies[closing], spot(closing, bar.b), bodies[k], spot(k, bar.b)
-                )
+            if closing is not None:  # to a bar: to the ground it ends with a segmentation fault
+                plant.AddBallConstraint(bodies[closing], spot(closing, bar.b), bodies[k], spot(k, bar.b))
         plant.Finalize()
         simulator = Simulator(plant)
         context = simulator.get_mutable_context()
@@ -156,10 +110,8 @@ def by_drake() -> Run:
         simulator.AdvanceTo(DURATION)
         seconds = time.perf_counter() - begin
         holder = problem.holder()
-        return (
-            plant.EvalBodyPoseInWorld(context, bodies[holder])
-            @ spot(holder, problem.watched)
-        )[:2], seconds
+        end = plant.EvalBodyPoseInWorld(context, bodies[holder]) @ spot(holder, problem.watched)
+        return end[:2], seconds
 
     return run
 
@@ -198,14 +150,12 @@ def by_mujoco() -> Run:
         model = build(problem, settings)
         data = mujoco.MjData(model)
         for k, _, holder, _ in problem.tree():
-            data.joint(f"hinge_{k}").qvel[0] = problem.turning(k) - problem.turning(
-                holder
-            )
+            data.joint(f"hinge_{k}").qvel[0] = problem.turning(k) - problem.turning(holder)
         begin = time.perf_counter()
         mujoco.mj_step(model, data, nstep=settings["steps"])
         seconds = time.perf_counter() - begin
         if any(warning.number for warning in data.warning):
-            raise Failed("unstable")
+            raise RunError("unstable")
         mujoco.mj_kinematics(model, data)
         return data.site(f"end_{problem.holder()}").xpos[:2].copy(), seconds
 

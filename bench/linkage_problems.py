@@ -43,37 +43,25 @@ class Problem:
 
     def place(self, joint: int) -> np.ndarray:
         """At the start."""
-        return np.array(
-            self.places(mpf(self.angle))[joint]
-            if joint >= 0
-            else self.fixed[-1 - joint],
-            float,
-        )
+        return np.array(self.places(mpf(self.angle))[joint] if joint >= 0 else self.fixed[-1 - joint], float)
 
     def speed(self, joint: int) -> np.ndarray:
         """At the start."""
-        return (
-            self.rate * np.array(slopes(self, mpf(self.angle))[joint], float)
-            if joint >= 0
-            else np.zeros(2)
-        )
+        if joint < 0:
+            return np.zeros(2)
+        return self.rate * np.array(slopes(self, mpf(self.angle))[joint], float)
 
     def turning(self, number: int) -> float:
         """The rate of a bar's angle at the start; of the ground, which is bar -1, too."""
         if number < 0:
             return 0.0
         bar = self.bars[number]
-        (x, y), (u, v) = (
-            self.place(bar.b) - self.place(bar.a),
-            self.speed(bar.b) - self.speed(bar.a),
-        )
+        (x, y), (u, v) = self.in_frame(number, bar.b), self.speed(bar.b) - self.speed(bar.a)
         return float(x * v - y * u) / bar.length**2
 
     def in_frame(self, number: int, joint: int) -> np.ndarray:
         """A joint at the start from the a of a bar, or from the origin of the ground."""
-        return self.place(joint) - (
-            self.place(self.bars[number].a) if number >= 0 else 0
-        )
+        return self.place(joint) - (self.place(self.bars[number].a) if number >= 0 else 0)
 
     def tree(self) -> list[tuple[int, Bar, int, int | None]]:
         """Bars with their numbers, each with what it hangs on and with the bar on which its b closes a loop, if any."""
@@ -91,13 +79,8 @@ class Problem:
 def slopes(problem: Problem, angle: mpf) -> list[tuple]:
     """How places change with the angle, by differences in 40 digits."""
     apart = mpf(10) ** -13
-    pairs = zip(
-        problem.places(angle + apart), problem.places(angle - apart), strict=True
-    )
-    return [
-        tuple((x - y) / (2 * apart) for x, y in zip(*pair, strict=True))
-        for pair in pairs
-    ]
+    pairs = zip(problem.places(angle + apart), problem.places(angle - apart), strict=True)
+    return [tuple((x - y) / (2 * apart) for x, y in zip(*pair, strict=True)) for pair in pairs]
 
 
 def find_truth(problem: Problem) -> np.ndarray:
@@ -109,18 +92,12 @@ def find_truth(problem: Problem) -> np.ndarray:
         inertia = height = mpf(0)
         for bar in problem.bars:
             u, v = along[bar.a], along[bar.b]
-            inertia += (
-                mpf(bar.mass)
-                / 3
-                * sum(x * x + x * y + y * y for x, y in zip(u, v, strict=True))
-            )
+            inertia += mpf(bar.mass) / 3 * sum(x * x + x * y + y * y for x, y in zip(u, v, strict=True))
             height += mpf(bar.mass) * (at[bar.a][1] + at[bar.b][1]) / 2
         return inertia, height
 
-    first, (inertia, height) = (
-        mpf(problem.angle),
-        inertia_and_height(mpf(problem.angle)),
-    )
+    first = mpf(problem.angle)
+    inertia, height = inertia_and_height(first)
     energy = inertia * mpf(problem.rate) ** 2 / 2 + mpf(GRAVITY) * height
 
     def pace(angle: mpf) -> mpf:
@@ -132,9 +109,7 @@ def find_truth(problem: Problem) -> np.ndarray:
     left = DURATION % turn
     with mp.workdps(20):
         end = findroot(
-            lambda x: quad(pace, linspace(first, x, 5)) - left,
-            first + 2 * pi * left / turn,
-            tol=1e-34,
+            lambda x: quad(pace, linspace(first, x, 5)) - left, first + 2 * pi * left / turn, tol=1e-34
         )
     return np.array(problem.places(end)[problem.watched], float)
 
@@ -192,13 +167,7 @@ A02 = Problem(
     name="A02",
     moving=3,
     fixed=[(0, 0), (1, 0), (2, 0)],
-    bars=[
-        Bar(-1, 0, 1, 1),
-        Bar(0, 1, 1, 1),
-        Bar(-2, 1, 1, 1),
-        Bar(1, 2, 1, 1),
-        Bar(-3, 2, 1, 1),
-    ],
+    bars=[Bar(-1, 0, 1, 1), Bar(0, 1, 1, 1), Bar(-2, 1, 1, 1), Bar(1, 2, 1, 1), Bar(-3, 2, 1, 1)],
     places=lambda angle: [(k + sin(angle), cos(angle)) for k in range(3)],
     angle=0.0,
     rate=1.0,
@@ -213,3 +182,32 @@ assemble = ["phi_1", "phi_2", "psi_1", "psi_2", "phi_dot_1", "phi_dot_2", "psi_d
 """,
 )
 A02_PUBLISHED = (0.328458111540815379, 0.944518538178600962)
+
+JOINTS_MODEL = """
+def define(model, links):
+    fixed, bars, g = {fixed}, {bars}, model.parameter("g", "m/s^2", default={gravity})
+    joints = [[model.coordinate(f"{{axis}}_{{k}}", "m") for axis in "xy"] for k in range({moving})]
+    model.point("watched", joints[{watched}])
+    model.lagrangian = 0
+    for k, (a, b, mass, length) in enumerate(bars):
+        p, q = (joints[j] if j >= 0 else fixed[-1 - j] for j in (a, b))
+        for x, y in zip(p, q):
+            u, v = (model.rate(each) if each not in (0, 1, 2) else 0 for each in (x, y))
+            model.lagrangian += mass * (u**2 + u * v + v**2) / 6
+        model.lagrangian -= mass * g * (p[1] + q[1]) / 2
+        model.constraint(f"bar_{{k}}", ((p[0] - q[0]) ** 2 + (p[1] - q[1]) ** 2 - length**2) / 2, "m^2")
+"""
+
+
+def in_joints(problem: Problem) -> tuple[str, str]:
+    """A model in the coordinates of linkage_peers.cpp, the places of joints, and its scenario but for the run."""
+    bars = [(bar.a, bar.b, bar.mass, bar.length) for bar in problem.bars]
+    model = JOINTS_MODEL.format(
+        fixed=problem.fixed, bars=bars, moving=problem.moving, watched=problem.watched, gravity=GRAVITY
+    )
+    start = [
+        f"{axis}_{k} = {float(place)!r}\n{axis}_dot_{k} = {float(speed)!r}\n"
+        for k in range(problem.moving)
+        for axis, place, speed in zip("xy", problem.place(k), problem.speed(k), strict=True)
+    ]
+    return model, f'[system]\nmodel = "joints_{problem.moving}.py"\n[start]\n{"".join(start)}'

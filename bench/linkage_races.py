@@ -2,9 +2,9 @@
 
 usage: taskset -c 1 python bench/linkage_races.py PROGRAM [--output FILE] [--only WORD] [--longest SECONDS]
 
-The error is how far a joint is after ten seconds from where it ought to be, in metres. Each contestant runs its settings
-from coarse to fine. The cheapest counts that comes within an error and whose next finer one does, too, so that no error
-counts that is small by chance. Those run again, in turn.
+The error is how far a joint is after ten seconds from where it ought to be, in metres. Each contestant runs its
+settings from coarse to fine. The cheapest counts that comes within an error and whose next finer one does, too, so that
+no error counts that is small by chance. Those run again, in turn.
 """
 
 import argparse
@@ -22,7 +22,7 @@ from importlib.metadata import version
 from pathlib import Path
 
 import numpy as np
-from linkage_packages import Failed, Run, by_drake, by_exudyn, by_mujoco
+from linkage_packages import Run, RunError, by_drake, by_exudyn, by_mujoco
 from linkage_problems import (
     A02,
     A02_MODEL,
@@ -32,25 +32,25 @@ from linkage_problems import (
     GRAVITY,
     Problem,
     find_truth,
+    in_joints,
 )
 
 ERRORS = (1e-6, 1e-9)  # m
 
 
-def by_pendula(program: Path, folder: Path) -> Run:
-    """Stepping alone, as its summary tells; by accuracy, where it tries tolerances first, all but its start."""
-    (folder / "a02.py").write_text(A02_MODEL)
-    environment = {
-        **os.environ,
-        "XDG_CACHE_HOME": str(folder),
-    }  # where kernels are kept
+def by_pendula(program: Path, folder: Path, *, joints: bool = False) -> Run:
+    """Stepping alone, as its summary tells; by accuracy, where it tries tolerances first, all but its start.
+
+    In angles, as its users write models, or in places of joints, as the methods by hand.
+    """
+    environment = {**os.environ, "XDG_CACHE_HOME": str(folder)}  # where kernels are kept
     made: set[str] = set()
 
-    def simulate(
-        problem: Problem, settings: dict, duration: float
-    ) -> tuple[dict, float]:
+    def simulate(problem: Problem, settings: dict, duration: float) -> tuple[dict, float]:
         file = folder / f"{problem.name}.toml"
-        file.write_text(problem.scenario)
+        model, scenario = in_joints(problem) if joints else (A02_MODEL, problem.scenario)
+        (folder / (f"joints_{problem.moving}.py" if joints else "a02.py")).write_text(model)
+        file.write_text(scenario)
         keys = {"run.duration": duration, "output.interval": DURATION, **settings}
         if "steps" in settings:
             keys["run.step"] = DURATION / keys.pop("steps")
@@ -62,11 +62,9 @@ def by_pendula(program: Path, folder: Path) -> Run:
             *(f"--set={key}={value}" for key, value in keys.items()),
         ]
         begin = time.perf_counter()
-        ended = subprocess.run(
-            words, capture_output=True, text=True, check=False, env=environment
-        )
+        ended = subprocess.run(words, capture_output=True, text=True, check=False, env=environment)
         if ended.returncode:
-            raise Failed(ended.stderr.strip().splitlines()[-1])
+            raise RunError(ended.stderr.strip().splitlines()[-1])
         return json.loads(ended.stdout), time.perf_counter() - begin
 
     def run(problem: Problem, settings: dict) -> tuple[np.ndarray, float]:
@@ -77,7 +75,7 @@ def by_pendula(program: Path, folder: Path) -> Run:
         seconds = summary["wall_seconds"]
         if "run.accuracy" in settings:
             seconds = whole - simulate(problem, settings, 1e-6)[1]
-        return np.array(summary["final"]["points"][problem.point]), seconds
+        return np.array(summary["final"]["points"]["watched" if joints else problem.point]), seconds
 
     return run
 
@@ -86,42 +84,19 @@ def by_hand(folder: Path, compiler: str) -> Run:
     """RATTLE and generalised-alpha of linkage_peers.cpp."""
     program = folder / "linkage_peers"
     source = Path(__file__).resolve().with_name("linkage_peers.cpp")
-    flags = [
-        "-std=c++20",
-        "-O3",
-        "-DNDEBUG",
-        "-march=native",
-        "-isystem",
-        "/usr/include/eigen3",
-    ]
+    flags = ["-std=c++20", "-O3", "-DNDEBUG", "-march=native", "-isystem", "/usr/include/eigen3"]
     subprocess.run([compiler, *flags, source, "-o", program], check=True)
 
     def run(problem: Problem, settings: dict) -> tuple[np.ndarray, float]:
         joints = [*range(problem.moving), *range(-1, -1 - len(problem.fixed), -1)]
-        rows = [
-            (
-                GRAVITY,
-                DURATION,
-                len(joints),
-                problem.moving,
-                len(problem.bars),
-                problem.watched,
-            )
-        ]
-        rows += [
-            (*problem.place(k).tolist(), *problem.speed(k).tolist()) for k in joints
-        ]
-        rows += [
-            (joints.index(bar.a), joints.index(bar.b), bar.mass, bar.length)
-            for bar in problem.bars
-        ]
+        rows = [(GRAVITY, DURATION, len(joints), problem.moving, len(problem.bars), problem.watched)]
+        rows += [(*problem.place(k).tolist(), *problem.speed(k).tolist()) for k in joints]
+        rows += [(joints.index(bar.a), joints.index(bar.b), bar.mass, bar.length) for bar in problem.bars]
         text = "\n".join(" ".join(map(repr, row)) for row in rows)
         words = [program, settings["method"], str(settings["steps"])]
-        ended = subprocess.run(
-            words, input=text, capture_output=True, text=True, check=False
-        )
+        ended = subprocess.run(words, input=text, capture_output=True, text=True, check=False)
         if ended.returncode:
-            raise Failed(ended.stderr.strip())
+            raise RunError(ended.stderr.strip())
         x, y, seconds = map(float, ended.stdout.split())
         return np.array([x, y]), seconds
 
@@ -142,11 +117,10 @@ def steps(first: int, **others: object) -> list[dict]:
     return [{**others, "steps": round(first * math.sqrt(2) ** k)} for k in range(40)]
 
 
-def contestants(
-    program: Path, compiler: str, folder: Path, only: str
-) -> list[Contestant]:
+def contestants(program: Path, compiler: str, folder: Path, only: str) -> list[Contestant]:
     """All whose names hold a word."""
     makers = {
+        "pendula, joints": lambda: by_pendula(program, folder, joints=True),
         "pendula": lambda: by_pendula(program, folder),
         "by hand": lambda: by_hand(folder, compiler),
         "Exudyn": by_exudyn,
@@ -154,6 +128,7 @@ def contestants(
         "MuJoCo": by_mujoco,
     }
     unwatched = {"run.estimate": "false"}  # as nobody does who does not know the end
+    tolerances = [{"run.tolerance": f"1e-{k}", **unwatched} for k in range(4, 14)]
     constant = [
         steps(first, **{"run.stages": stages, "run.iteration": way, **unwatched})
         for stages, first in ((2, 500), (3, 250), (4, 250), (6, 50), (8, 50))
@@ -168,35 +143,23 @@ def contestants(
     }
     settings = {
         "pendula, accuracy": [[{"run.accuracy": f"1e-{k}"} for k in range(4, 14)]],
-        "pendula, tolerance": [
-            [{"run.tolerance": f"1e-{k}", **unwatched} for k in range(4, 14)]
-        ],
+        "pendula, tolerance": [tolerances],
         "pendula, constant steps": constant,
+        "pendula, joints, tolerance": [tolerances],
+        "pendula, joints, constant steps": constant,
         "by hand: RATTLE": [steps(1000, method="rattle")],
         "by hand: RATTLE, order 6": [steps(250, method="rattle6")],
         "by hand: RATTLE, order 8": [steps(250, method="rattle8")],
-        "by hand: generalised-alpha": [
-            steps(2000, method=radius) for radius in ("0.8", "0.95")
-        ],
+        "by hand: generalised-alpha": [steps(2000, method=radius) for radius in ("0.8", "0.95")],
         **{f"Exudyn, {name}": ladders for name, ladders in exudyn.items()},
         "Drake, discrete": [steps(1000)],
-        "MuJoCo, RK4": [
-            steps(1000, integrator="RK4", stiff=stiff) for stiff in (1, 2, 4)
-        ],
+        "MuJoCo, RK4": [steps(1000, integrator="RK4", stiff=stiff) for stiff in (1, 2, 4)],
         "MuJoCo, Euler": [steps(1000, integrator="Euler", stiff=2)],
     }
     chosen = {name: ladders for name, ladders in settings.items() if only in name}
-    runs = {
-        key: make()
-        for key, make in makers.items()
-        if any(name.startswith(key) for name in chosen)
-    }
+    runs = {key: make() for key, make in makers.items() if any(name.startswith(key) for name in chosen)}
     return [
-        Contestant(
-            name,
-            next(run for key, run in runs.items() if name.startswith(key)),
-            ladders,
-        )
+        Contestant(name, next(run for key, run in runs.items() if name.startswith(key)), ladders)
         for name, ladders in chosen.items()
     ]
 
@@ -207,19 +170,10 @@ def attempt(contestant: Contestant, problem: Problem, settings: dict) -> dict:
         ends = [contestant.run(problem, settings)]
         while ends[0][1] < 0.1 and len(ends) < 3:
             ends.append(contestant.run(problem, settings))
-    except Failed as failure:
-        return {
-            "settings": settings,
-            "error": math.inf,
-            "seconds": 0.0,
-            "failure": str(failure),
-        }
+    except RunError as failure:
+        return {"settings": settings, "error": math.inf, "seconds": 0.0, "failure": str(failure)}
     error = float(np.hypot(*(ends[0][0] - problem.truth)))
-    return {
-        "settings": settings,
-        "error": error,
-        "seconds": min(seconds for _, seconds in ends),
-    }
+    return {"settings": settings, "error": error, "seconds": min(seconds for _, seconds in ends)}
 
 
 def scan(contestant: Contestant, problem: Problem, longest: float) -> list[list[dict]]:
@@ -231,11 +185,7 @@ def scan(contestant: Contestant, problem: Problem, longest: float) -> list[list[
             trials.append(attempt(contestant, problem, settings))
             errors = [trial["error"] for trial in trials]
             past = errors.index(min(errors)) < len(errors) - 6
-            if (
-                trials[-1]["seconds"] > longest
-                or past
-                or max(errors[-2:]) < min(ERRORS) / 100
-            ):
+            if trials[-1]["seconds"] > longest or past or max(errors[-2:]) < min(ERRORS) / 100:
                 break
         tried.append(trials)
     return tried
@@ -243,9 +193,7 @@ def scan(contestant: Contestant, problem: Problem, longest: float) -> list[list[
 
 def choose(tried: list[list[dict]], error: float) -> dict | None:
     """The cheapest trial within an error whose next finer one, of those that got to the end, is so, too."""
-    ran = [
-        [trial for trial in trials if math.isfinite(trial["error"])] for trials in tried
-    ]
+    ran = [[trial for trial in trials if math.isfinite(trial["error"])] for trials in tried]
     good = [
         trial
         for trials in ran
@@ -255,9 +203,7 @@ def choose(tried: list[list[dict]], error: float) -> dict | None:
     return min(good, key=lambda trial: trial["seconds"], default=None)
 
 
-def race(
-    problem: Problem, field: list[Contestant], arguments: argparse.Namespace
-) -> dict:
+def race(problem: Problem, field: list[Contestant], arguments: argparse.Namespace) -> dict:
     """Scans, then runs what was chosen again, in turn."""
     problem.truth = find_truth(problem)
     found: dict[str, dict] = {}
@@ -265,17 +211,9 @@ def race(
         tried = scan(contestant, problem, arguments.longest)
         every = [trial for trials in tried for trial in trials]
         nearest = min(every, key=lambda trial: trial["error"])
-        chosen = {
-            f"{error:.0e}": choose(tried, error) or {**nearest, "missed": True}
-            for error in ERRORS
-        }
+        chosen = {f"{error:.0e}": choose(tried, error) or nearest for error in ERRORS}
         failed = sum(not math.isfinite(trial["error"]) for trial in every)
-        found[contestant.name] = {
-            "chosen": chosen,
-            "nearest": nearest,
-            "failed": failed,
-            "trials": every,
-        }
+        found[contestant.name] = {"chosen": chosen, "nearest": nearest, "failed": failed, "trials": every}
         print(
             f"{problem.name}, {contestant.name}: nearest {nearest['error']:.1e} m",
             file=sys.stderr,
@@ -283,11 +221,9 @@ def race(
         )
     for _ in range(arguments.rounds):
         for contestant in field:
-            for trial in found[contestant.name]["chosen"].values():
+            for trial in {id(trial): trial for trial in found[contestant.name]["chosen"].values()}.values():
                 if math.isfinite(trial["error"]):
-                    trial.setdefault("times", []).append(
-                        contestant.run(problem, trial["settings"])[1]
-                    )
+                    trial.setdefault("times", []).append(contestant.run(problem, trial["settings"])[1])
     for each in found.values():
         for trial in each["chosen"].values():
             trial["seconds"] = statistics.median(trial.get("times", [math.nan]))
@@ -304,28 +240,15 @@ def tabulate(problem: Problem, found: dict) -> str:
     for name, each in found.items():
         cells = []
         for error, trial in each["chosen"].items():
-            ours = [
-                one["chosen"][error]
-                for key, one in found.items()
-                if key.startswith("pendula")
-            ]
-            best = min(
-                (one["seconds"] for one in ours if "missed" not in one),
-                default=math.nan,
-            )
-            shown, times = (
-                f"{1e3 * trial['seconds']:.3g}",
-                f"{trial['seconds'] / best:.3g}×",
-            )
-            cells += (
-                [f"*{shown} ({trial['error']:.0e})*", ""]
-                if "missed" in trial
-                else [shown, times]
-            )
+            shown = f"{1e3 * trial['seconds']:.3g}"
+            if not trial["error"] <= float(error):
+                cells += [f"*{shown} ({trial['error']:.0e})*", ""]
+                continue
+            ours = [one["chosen"][error] for key, one in found.items() if key.startswith("pendula")]
+            best = min((one["seconds"] for one in ours if one["error"] <= float(error)), default=math.nan)
+            cells += [shown, f"{trial['seconds'] / best:.3g}×"]
         failed = f"{each['failed']} of {len(each['trials'])}"
-        lines.append(
-            f"| {name} | {' | '.join(cells)} | {each['nearest']['error']:.1e} | {failed} |"
-        )
+        lines.append(f"| {name} | {' | '.join(cells)} | {each['nearest']['error']:.1e} | {failed} |")
     return "\n".join(lines)
 
 
@@ -337,45 +260,28 @@ def main() -> None:
     parser.add_argument("--output", type=Path, default=Path("linkages.json"))
     parser.add_argument("--only", default="", help="contestants whose names hold this")
     parser.add_argument(
-        "--longest",
-        type=float,
-        default=10.0,
-        help="seconds of a run, past which nothing finer is tried",
+        "--longest", type=float, default=10.0, help="seconds of a run, past which nothing finer is tried"
     )
     parser.add_argument("--rounds", type=int, default=5)
     arguments = parser.parse_args()
     program = arguments.program.resolve()
     results: dict = {"load": os.getloadavg()[0]}
+    results["versions"] = {name: version(name) for name in ("exudyn", "drake", "mujoco")}
     arguments.output = arguments.output.resolve()
-    with (
-        tempfile.TemporaryDirectory() as folder,
-        contextlib.chdir(folder),
-    ):  # where MuJoCo leaves its warnings
-        field = contestants(
-            program,
-            arguments.compiler,
-            Path(folder),
-            arguments.only,
-        )
+    # MuJoCo leaves its warnings in the folder where it is.
+    with tempfile.TemporaryDirectory() as folder, contextlib.chdir(folder):
+        field = contestants(program, arguments.compiler, Path(folder), arguments.only)
         for problem in (FOUR_BAR, A02):
             found = race(problem, field, arguments)
-            results[problem.name] = {
-                "truth": problem.truth.tolist(),
-                "contestants": found,
-            }
+            results[problem.name] = {"truth": problem.truth.tolist(), "contestants": found}
             print(tabulate(problem, found), end="\n\n", flush=True)
+            text = (
+                json.dumps(results, default=str, indent=1).replace("Infinity", "null").replace("NaN", "null")
+            )
+            arguments.output.write_text(text + "\n")
     off = np.hypot(*(A02.truth - A02_PUBLISHED))
-    print(f"The quadrature is {off:.1e} m off what is published of A02.")
-    results["versions"] = {
-        name: version(name) for name in ("exudyn", "drake", "mujoco")
-    }
-    print(
-        f"{results['versions']}; load {results['load']:.1f} before and {os.getloadavg()[0]:.1f} after"
-    )
-    text = json.dumps(results, default=str, indent=1)
-    arguments.output.write_text(
-        text.replace("Infinity", "null").replace("NaN", "null") + "\n"
-    )
+    print(f"The quadrature is {off:.1e} m off the published end of A02.")
+    print(f"{results['versions']}; load {results['load']:.1f} before and {os.getloadavg()[0]:.1f} after")
 
 
 if __name__ == "__main__":
