@@ -36,6 +36,7 @@ from linkage_problems import (
 )
 
 ERRORS = (1e-6, 1e-9)  # m
+ROUNDING = 1e-5  # m; larger errors that grow again may have been small by chance
 
 
 def by_pendula(program: Path, folder: Path, *, joints: bool = False) -> Run:
@@ -177,14 +178,14 @@ def attempt(contestant: Contestant, problem: Problem, settings: dict) -> dict:
 
 
 def scan(contestant: Contestant, problem: Problem, longest: float) -> list[list[dict]]:
-    """Each ladder until its runs take too long or are good enough, or have failed or grown worse six times in a row."""
+    """Each ladder until its runs take too long or are good enough; or until six in a row fail, or are worse by rounding."""
     tried = []
     for ladder in contestant.ladders:
         trials: list[dict] = []
         for settings in ladder:
             trials.append(attempt(contestant, problem, settings))
             errors = [trial["error"] for trial in trials]
-            past = errors.index(min(errors)) < len(errors) - 6
+            past = errors.index(min(errors)) < len(errors) - 6 and not ROUNDING < min(errors) < math.inf
             if trials[-1]["seconds"] > longest or past or max(errors[-2:]) < min(ERRORS) / 100:
                 break
         tried.append(trials)
