@@ -1,6 +1,6 @@
 """Time against error on two linkages: pendula, RATTLE and generalised-alpha by hand, Exudyn, Drake, MuJoCo.
 
-usage: taskset -c 1 python bench/linkage_races.py PROGRAM [--output FILE] [--only WORD] [--longest SECONDS]
+usage: taskset -c 1 python bench/linkage_races.py PROGRAM [--output FILE] [--only REGEX] [--longest SECONDS]
 
 The error is how far a joint is after ten seconds from where it ought to be, in metres. Each contestant runs its
 settings from coarse to fine. The cheapest counts that comes within an error and whose next finer one does, too, so that
@@ -12,6 +12,7 @@ import contextlib
 import json
 import math
 import os
+import re
 import statistics
 import subprocess
 import sys
@@ -119,7 +120,7 @@ def steps(first: int, **others: object) -> list[dict]:
 
 
 def contestants(program: Path, compiler: str, folder: Path, only: str) -> list[Contestant]:
-    """All whose names hold a word."""
+    """All whose names a regular expression finds."""
     makers = {
         "pendula, joints": lambda: by_pendula(program, folder, joints=True),
         "pendula": lambda: by_pendula(program, folder),
@@ -157,7 +158,7 @@ def contestants(program: Path, compiler: str, folder: Path, only: str) -> list[C
         "MuJoCo, RK4": [steps(1000, integrator="RK4", stiff=stiff) for stiff in (1, 2, 4)],
         "MuJoCo, Euler": [steps(1000, integrator="Euler", stiff=2)],
     }
-    chosen = {name: ladders for name, ladders in settings.items() if only in name}
+    chosen = {name: ladders for name, ladders in settings.items() if re.search(only, name)}
     runs = {key: make() for key, make in makers.items() if any(name.startswith(key) for name in chosen)}
     return [
         Contestant(name, next(run for key, run in runs.items() if name.startswith(key)), ladders)
@@ -178,7 +179,7 @@ def attempt(contestant: Contestant, problem: Problem, settings: dict) -> dict:
 
 
 def scan(contestant: Contestant, problem: Problem, longest: float) -> list[list[dict]]:
-    """Each ladder until its runs take too long or are good enough; or until six in a row fail, or are worse by rounding."""
+    """Each ladder until its runs take too long or are good enough, or six in a row fail or are worse by rounding."""
     tried = []
     for ladder in contestant.ladders:
         trials: list[dict] = []
@@ -259,7 +260,7 @@ def main() -> None:
     parser.add_argument("program", type=Path)
     parser.add_argument("--compiler", default="clang++")
     parser.add_argument("--output", type=Path, default=Path("linkages.json"))
-    parser.add_argument("--only", default="", help="contestants whose names hold this")
+    parser.add_argument("--only", default="", help="contestants whose names this regular expression finds")
     parser.add_argument(
         "--longest", type=float, default=10.0, help="seconds of a run, past which nothing finer is tried"
     )
