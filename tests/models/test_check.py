@@ -11,10 +11,24 @@ from test_forcing import MODEL as FORCED
 from test_forcing import SHARP
 
 SYSTEMS = sorted(file for file in EXAMPLES.glob("*.toml") if "[system]" in file.read_text())
-OWN = {"forced": FORCED, "sharp": SHARP, "sprung": blocks("python")[0]}
+# Between two bars of numbers alone: some of their products come from nothing else.
+NUMBERS = """
+def define(model, links):
+    places = [(0, 0), [model.coordinate(f"{axis}_1", "m") for axis in "xy"], (1, 0)]
+    model.lagrangian = 0
+    for p, q in ((places[0], places[1]), (places[1], places[2])):
+        for x, y in zip(p, q):
+            u, v = (0 if each in (0, 1) else model.rate(each) for each in (x, y))
+            model.lagrangian += (u**2 + u * v + v**2) / 6
+        model.lagrangian -= 9.81 * (p[1] + q[1]) / 2
+"""
+OWN = {"numbers": NUMBERS, "forced": FORCED, "sharp": SHARP, "sprung": blocks("python")[0]}
 # With the links that other tests compile them for.
 MODELS = [
-    *[(name, None) for name in ("furuta", "spring_pendulum", "swinging_atwood", "forced", "sharp")],
+    *[
+        (name, None)
+        for name in ("furuta", "spring_pendulum", "swinging_atwood", "forced", "numbers", "sharp")
+    ],
     *[(name, 2) for name in ("cart_chain", "driven_chain", "rods", "sprung")],
     ("joint_springs", 3),
 ]
