@@ -7,8 +7,8 @@ import pytest
 from conftest import EXAMPLES
 from numpy.typing import NDArray
 
-# M q'' + v C1 q' + (g K0 + v^2 K2) q = 0, q = (lean, steer): J. P. Meijaard, J. M. Papadopoulos, A. Ruina, A. L. Schwab,
-# Proc. R. Soc. A 463 (2007) 1955, with 14 digits.
+# M q'' + v C1 q' + (g K0 + v^2 K2) q = 0, q = (lean, steer), with 14 digits: J. P. Meijaard, J. M. Papadopoulos,
+# A. Ruina, A. L. Schwab, Proc. R. Soc. A 463 (2007) 1955.
 M = np.array([[80.81722, 2.31941332208709], [2.31941332208709, 0.29784188199686]])
 C1 = np.array([[0.0, 33.86641391492494], [-0.85035641456978, 1.68540397397560]])
 K0 = np.array([[-80.95, -2.59951685249872], [-2.59951685249872, -0.80329488458618]])

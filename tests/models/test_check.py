@@ -11,14 +11,15 @@ from test_forcing import MODEL as FORCED
 from test_forcing import SHARP
 
 SYSTEMS = sorted(file for file in EXAMPLES.glob("*.toml") if "[system]" in file.read_text())
-# Between two bars of numbers alone: some of their products come from nothing else.
+# Joints between bars, by numbers alone: some products are of nothing else.
 NUMBERS = """
 def define(model, links):
-    places = [(0, 0), [model.coordinate(f"{axis}_1", "m") for axis in "xy"], (1, 0)]
+    fixed, joints = [(0, 0), (1, 0), (2, 0)], [[model.coordinate(f"{a}_{k}", "m") for a in "xy"] for k in range(3)]
+    bars = (fixed[0], joints[0]), (joints[0], joints[1]), (fixed[1], joints[1]), (joints[1], joints[2])
     model.lagrangian = 0
-    for p, q in ((places[0], places[1]), (places[1], places[2])):
+    for p, q in (*bars, (fixed[2], joints[2])):
         for x, y in zip(p, q):
-            u, v = (0 if each in (0, 1) else model.rate(each) for each in (x, y))
+            u, v = (0 if each in (0, 1, 2) else model.rate(each) for each in (x, y))
             model.lagrangian += (u**2 + u * v + v**2) / 6
         model.lagrangian -= 9.81 * (p[1] + q[1]) / 2
 """
