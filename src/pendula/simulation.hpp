@@ -214,8 +214,8 @@ class Simulation {
   /// Stops advances, also within long steps, when a stop is requested. Copies do not heed it.
   void heed(std::stop_token stop) { guard_->stop = std::move(stop); }
 
-  /// Where the d coordinates and rates are in (q, v) from which the others follow by constraints here, ascending; without
-  /// constraints all.
+  /// Where the d coordinates and rates are in (q, v) from which the others follow by constraints here, ascending;
+  /// without constraints all.
   std::vector<int> independent() const {
     std::vector<int> found(2 * model_.coordinates());
     int count = 0;
