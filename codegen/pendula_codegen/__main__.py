@@ -211,9 +211,14 @@ def _run_link(options: argparse.Namespace) -> None:
 
 
 def _run_model(options: argparse.Namespace) -> None:
-    model = read_model(find_model(options.model), options.links)
-    model.move({})
+    model = _moved_model(options.model, options.links)
     _write(options.output, f"{model.name}.hpp", render_model(model, Path(options.model).name, options.alias))
+
+
+def _moved_model(name: str, links: int | None = None) -> Model:
+    model = read_model(find_model(name), links)
+    model.move({})
+    return model
 
 
 def _run_program(options: argparse.Namespace) -> None:
@@ -357,7 +362,8 @@ def committed_headers() -> dict[str, Header]:
         for links in numbers
     }
     links = {f"{space}_link.hpp": render_link(space) for space in COMMITTED}
-    return {**kernels, **links, "gauss_tableaux.hpp": render_tableaux()}
+    linkage = {"four_bar.hpp": render_model(_moved_model("four_bar"), "four_bar")}
+    return {**kernels, **links, **linkage, "gauss_tableaux.hpp": render_tableaux()}
 
 
 if __name__ == "__main__":

@@ -16,7 +16,7 @@ def test_generated_headers_are_up_to_date(fresh_headers):
 def test_committed_set():
     names = {path.stem for path in (REPOSITORY / "generated").glob("*.hpp")}
     planar, spatial = {f"planar_{n}" for n in range(1, 5)}, {f"spatial_{n}" for n in range(1, 4)}
-    assert names == planar | spatial | {"planar_link", "spatial_link", "gauss_tableaux"}
+    assert names == planar | spatial | {"four_bar", "planar_link", "spatial_link", "gauss_tableaux"}
 
 
 def test_the_generator_has_the_version_of_the_project():
