@@ -42,8 +42,7 @@ class ChainSolver : public StageIterations<ChainStages<SpaceType, S, N, RealType
 
   /// Throws std::invalid_argument unless `stages` is S and the method exists with S stages.
   ChainSolver(const Model& chain, int stages, Iteration iteration = Iteration::automatic, Family family = Family::gauss)
-      : Base(IterationChoice(chain.is_held() ? Iteration::fixed_point : iteration, newton_cost<Space>(S)), chain,
-             family),
+      : Base(chain.is_held() ? Iteration::fixed_point : iteration, newton_cost<Space>(S), chain, family),
         family_(family),
         newton_(iteration == Iteration::fixed_point || chain.is_held() ? 0 : chain.links()),
         turn_(stages, order_of(family, stages)) {

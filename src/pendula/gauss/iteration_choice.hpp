@@ -20,19 +20,13 @@ inline bool diverges(double correction, double last, int count, double rounding,
   return count > 20 ? far || slow : far && count > 3 && correction > 0.7 * last;
 }
 
-/// What costs of steps are compared by. Steps that a fixed point does not solve may be halved until it does: then costs
-/// of a second decide. With constraints, an iteration by Newton costs up to 45 by fixed point.
-enum class CostOf : std::uint8_t { step, time };
-
 /// Chooses between Newton and fixed point by the cost of a step: its iterations, as counted, times the cost of one. The
 /// other iteration is tried for a step now and then, so that the choice follows the motion. Nothing here depends on a
 /// clock: the same run makes the same choices.
 class IterationChoice {
  public:
-  /// newton_cost: the cost of a Newton iteration, in fixed-point iterations.
-  IterationChoice(Iteration wanted, double newton_cost, CostOf compared = CostOf::step)
+  IterationChoice(Iteration wanted, double newton_cost)
       : wanted_(wanted),
-        compared_(compared),
         preferred_(wanted == Iteration::automatic ? Iteration::fixed_point : wanted),
         active_(preferred_),
         cost_{newton_cost, 1.0} {}
@@ -40,13 +34,6 @@ class IterationChoice {
   Iteration active() const { return active_; }
   Iteration preferred() const { return preferred_; }
   bool is_automatic() const { return wanted_ == Iteration::automatic; }
-
-  /// A step of h is tried. Where a fixed point does not contract, Newton takes over if that is allowed; otherwise the
-  /// step is not solved.
-  void try_step(double h, bool newton_is_allowed) {
-    if (compared_ == CostOf::time) h_ = std::abs(h);
-    newton_is_allowed_ = newton_is_allowed;
-  }
 
   void begin_step() {
     begin_look();
@@ -62,14 +49,11 @@ class IterationChoice {
 
   template <class Numbers>
   void member(Numbers& numbers) {
-    numbers(preferred_, spent_, steps_, wait_, next_wait_, solved_);
+    numbers(preferred_, spent_, steps_, wait_, next_wait_);
   }
 
-  /// Whether Newton may cost less than shorter steps by fixed point.
-  bool newton_may_pay() const {
-    const double newton = spent_[index(Iteration::newton)], fixed_point = spent_[index(Iteration::fixed_point)];
-    return compared_ == CostOf::step || newton == 0 || fixed_point == 0 || newton < fixed_point;
-  }
+  /// Sets whether Newton takes over where a fixed point does not contract. If not, the step is not solved.
+  void allow_newton(bool allowed) { newton_is_allowed_ = allowed; }
   bool newton_is_allowed() const { return newton_is_allowed_; }
 
   void count_iteration() { ++iterations_[index(active_)]; }
@@ -82,16 +66,13 @@ class IterationChoice {
 
   void end_step() {
     if (!is_automatic()) return;
-    if (gave_up_ && shorter_steps_pay()) {
-      spent_[index(Iteration::fixed_point)] *= doubt;
-    } else if (gave_up_) {
+    if (gave_up_) {
       preferred_ = Iteration::newton;
       spent_[index(Iteration::fixed_point)] = forbidden;
       wait_ = next_wait_;
       next_wait_ = std::min(2 * next_wait_, trial_interval);
     } else {
       spent_[index(active_)] = cost_of(active_, iterations_[index(active_)]);
-      if (active_ == Iteration::fixed_point) solved_ = h_;
     }
     gave_up_ = false;
     const Iteration rival = other(preferred_);
@@ -106,16 +87,7 @@ class IterationChoice {
   }
 
   double cost_of(Iteration iteration, int iterations) const {
-    return cost_[index(iteration)] * (iterations + (iteration == Iteration::newton ? last_evaluation : 0)) / h_;
-  }
-
-  // Of a step that Newton has taken over: whether a fixed point that solved shorter ones takes less.
-  bool shorter_steps_pay() {
-    if (compared_ == CostOf::step) return false;
-    double& newton = spent_[index(Iteration::newton)];
-    newton = cost_of(Iteration::newton, iterations_[index(Iteration::newton)]);
-    const double fixed_point = spent_[index(Iteration::fixed_point)];
-    return solved_ < shorter * h_ && fixed_point > 0 && fixed_point < worthwhile * newton;
+    return cost_[index(iteration)] * (iterations + (iteration == Iteration::newton ? last_evaluation : 0));
   }
 
   // A trial cannot pay where two iterations of the rival cost more than a step does now. Fewer are not expected: where
@@ -133,14 +105,9 @@ class IterationChoice {
   static constexpr double last_evaluation = 0.3;  // of forces after the last Newton iteration, in iterations
   static constexpr double worthwhile = 0.9;       // what a change has to save
   static constexpr double forbidden = 1e300;
-  static constexpr double shorter = 0.9;  // than a step, of steps that are chosen
-  static constexpr double doubt = 1.5;    // by how much more a fixed point is thought to cost where it gave up
 
-  Iteration wanted_;
-  CostOf compared_;
-  Iteration preferred_, active_;
+  Iteration wanted_, preferred_, active_;
   std::array<double, 2> cost_;
-  double h_ = 1, solved_ = 0;  // of this step, and of the last that a fixed point solved; 1 where costs are of steps
   std::array<double, 2> spent_{};  // cost of the last step with each iteration; 0: none yet
   std::array<int, 2> iterations_{};
   bool gave_up_ = false;

@@ -37,7 +37,7 @@ class LagrangianSolver : public StageIterations<LagrangianStages<Width, Form>> {
   /// there: Gauss methods in momentum form do.
   LagrangianSolver(const Model& model, int stages, Iteration iteration = Iteration::automatic,
                    Family family = Family::gauss)
-      : Base(choice_for(model, iteration, family, stages), model, checked(stages), family),
+      : Base(iteration_for(model, iteration, family), newton_cost(model, stages), model, checked(stages), family),
         family_(family),
         newton_(model, stages),
         forcing_(model, family, stages),
@@ -142,21 +142,11 @@ class LagrangianSolver : public StageIterations<LagrangianStages<Width, Form>> {
     return Form::has_fixed_point ? asked : Iteration::newton;
   }
 
-  static IterationChoice choice_for(const Model& model, Iteration iteration, Family family, int stages) {
-    return {iteration_for(model, iteration, family), newton_cost(model, stages),
-            model.info().constraints.empty() ? CostOf::step : CostOf::time};
-  }
-
   // Cost of a Newton iteration in fixed-point iterations, to within a third, as measured on kernels of one to six
-  // coordinates (g++ 12, AVX2 and AVX-512); with constraints, of which all are corrected together, to within a half, on
-  // eight linkages with two to eleven (Clang 14, AVX-512).
+  // coordinates (g++ 12, AVX2 and AVX-512).
   static double newton_cost(const Model& model, int stages) {
-    const auto coordinates = static_cast<double>(model.coordinates());
-    const auto constraints = static_cast<double>(model.info().constraints.size());
-    if (constraints == 0) return stages * std::min(1.6 + 0.75 * coordinates, 5.5);
-    const double unknowns = stages * (coordinates + constraints), lacking = stages * constraints;
-    const double newton = unknowns / 5 + unknowns * unknowns * unknowns / 12500;  // us
-    return newton / (0.25 + coordinates / 33 + lacking * lacking / 330);
+    const auto unknowns = static_cast<double>(model.coordinates() + model.info().constraints.size());
+    return stages * std::min(1.6 + 0.75 * unknowns, 5.5);
   }
 
   bool has_to_look() const { return !stages_.info().argument_is_base.empty(); }

@@ -21,12 +21,11 @@ class StageIterations {
 
   void prepare(const StepTask& task) {
     stages_.prepare(task);
-    choice_.try_step(task.h, task.may_use_newton);
     if (task.from != PredictedFrom::same_step) choice_.begin_step();
+    choice_.allow_newton(task.may_use_newton);
     count_ = 0;
   }
   Iteration iteration() const { return choice_.preferred(); }
-  bool newton_may_pay() const { return choice_.newton_may_pay(); }
   /// What rounding may make of the last correction of a fixed point, relative, where that may be more than usual.
   double rounding() const {
     if constexpr (requires { stages_.rounding(); }) return stages_.rounding();
@@ -55,9 +54,10 @@ class StageIterations {
   }
 
  protected:
+  /// newton_cost: the cost of a Newton iteration, in fixed-point iterations.
   template <class... Given>
-  StageIterations(const IterationChoice& choice, Given&&... stages)
-      : stages_(std::forward<Given>(stages)...), choice_(choice) {}
+  StageIterations(Iteration iteration, double newton_cost, Given&&... stages)
+      : stages_(std::forward<Given>(stages)...), choice_(iteration, newton_cost) {}
 
   bool is_by_newton() const { return choice_.active() == Iteration::newton; }
 

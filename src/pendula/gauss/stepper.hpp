@@ -197,7 +197,7 @@ class GaussStepper : private StepSolution<Solver> {
   /// One whose error is too large predicts the stages of the next, shorter one.
   Outcome try_step(double h, bool is_first) {
     if (is_first) {
-      search_ = {controller_, halved_ > often && newton_may_pay() ? 0 : fixed_point_worth};
+      search_ = {controller_, halved_ > often ? 0 : fixed_point_worth};
       halved_ = std::max(0, halved_ - 1);
     }
     const PredictedFrom from = search_.is_found ? PredictedFrom::same_step : PredictedFrom::last_step;
@@ -217,11 +217,6 @@ class GaussStepper : private StepSolution<Solver> {
       if (search_.shorter > 0 && --search_.shorter == 0) controller_ = search_.before;
     }
     return outcome;
-  }
-
-  bool newton_may_pay() const {
-    if constexpr (requires { solver_.newton_may_pay(); }) return solver_.newton_may_pay();
-    return true;
   }
 
   Outcome take(const Outcome& found, bool is_cut) {
