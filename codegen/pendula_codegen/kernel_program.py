@@ -34,10 +34,10 @@ def render_c(model: Model, source: str, file: str) -> str:
         widths=(1, 2, 4, 8),
         unrolled=UNROLLED,
         size=len(model.coordinates),
-        description=[quoted(line) for line in info_lines(kernel, table.series_or_none)],
+        description=[quoted(line) for line in info_lines(kernel, table.series)],
         functions=print_functions(table),
         plain=print_plain(table),
-        series=print_series(table.series, table.names) if table.series_or_none else None,
+        series=print_series(table.series, table.names),
         inputs=len(model.inputs),
         used=used,
         calls=sorted(used & CALLS),
@@ -49,13 +49,11 @@ def render_bytecode(model: Model) -> str:
     kernel = ModelKernel(model)
     table = kernel_table(kernel)
     functions = [
-        function
-        for function in (*table.of_many, *table.plain, *series_functions(table.series_or_none))
-        if function
+        function for function in (*table.of_many, *table.plain, *series_functions(table.series)) if function
     ]
     lines = [
         f"program\t{INTERFACE}",
-        *info_lines(kernel, table.series_or_none),
+        *info_lines(kernel, table.series),
         *(line for function in functions for line in function_lines(function)),
         "end",
     ]
@@ -66,6 +64,4 @@ def render_llvm(model: Model, instruction_set: str) -> str:
     """The kernel of a model as LLVM's text, for an instruction set of the library."""
     kernel = ModelKernel(model)
     table = kernel_table(kernel)
-    return print_kernel(
-        table, len(model.coordinates), info_lines(kernel, table.series_or_none), instruction_set
-    )
+    return print_kernel(table, len(model.coordinates), info_lines(kernel, table.series), instruction_set)

@@ -45,11 +45,6 @@ class ModelKernel(SystemKernel):
         self.model = model
 
     @property
-    def moves_by_series(self) -> bool:
-        """Not with constraints: their forces have no series."""
-        return not self.model.constraints
-
-    @property
     def declared(self) -> Declared:
         model = self.model
         points = [(point.name, len(point.components)) for point in model.points]

@@ -13,7 +13,7 @@ from pendula_codegen.model_kernel import ModelKernel
 from pendula_codegen.series_tape import SeriesTapes
 
 
-def info_lines(kernel: ModelKernel, tapes: SeriesTapes | None) -> list[str]:
+def info_lines(kernel: ModelKernel, tapes: SeriesTapes) -> list[str]:
     """One thing in a line, its words with tabs between them: src/pendula/system/kernel_text.hpp reads it."""
     model = kernel.model
     rows: list[tuple[object, ...]] = [
@@ -35,12 +35,9 @@ def info_lines(kernel: ModelKernel, tapes: SeriesTapes | None) -> list[str]:
     rows += [("argument", is_base) for _, is_base in kernel.call_arguments]
     rows += [("switch", switch.text) for switch in model.switches]
     rows += [("constraint", each.name, each.unit, each.of_rates) for each in model.constraints]
-    if tapes is None:
-        rows.append(("series", False, 0, 0, 0))
-    else:
-        series = tapes.series
-        rows.append(("series", series.has_momenta, len(series.sums), len(series.operands), tapes.kept))
-        rows += [("sum", *pair) for pair in series.places]
+    series = tapes.series
+    rows.append(("series", series.has_momenta, len(series.sums), len(series.operands), tapes.kept))
+    rows += [("sum", *pair) for pair in series.places]
     return [
         "\t".join(str(int(word)) if isinstance(word, bool) else str(word) for word in row) for row in rows
     ]

@@ -63,20 +63,15 @@ class KernelTable:
 
     of_many: list[TableFunction | None]
     plain: list[TableFunction | None]
-    series_or_none: SeriesTapes | None
+    series: SeriesTapes
     names: Mapping[Row, str]
     rows: Mapping[str, int]
 
-    @property
-    def series(self) -> SeriesTapes:
-        """Those of a kernel that moves by series."""
-        assert self.series_or_none is not None
-        return self.series_or_none
-
     def operations(self) -> set[str]:
         """All operations that the functions use."""
-        functions = filter(None, (*self.of_many, *self.plain, *series_functions(self.series_or_none)))
-        return {step.operation for function in functions for step in function.tape.steps}
+        functions = filter(None, (*self.of_many, *self.plain))
+        tapes = [self.series.start, self.series.next, *(function.tape for function in functions)]
+        return {step.operation for tape in tapes for step in tape.steps}
 
 
 def kernel_table(kernel: ModelKernel) -> KernelTable:
@@ -90,7 +85,8 @@ class _Tables:
         self._functions = self._recorder.functions
 
     def table(self) -> KernelTable:
-        series = series_tapes(self._kernel, self._recorder.row) if self._kernel.moves_by_series else None
+        series = series_tapes(self._kernel, self._recorder.row)
+        start, following = series_functions(series)
         composed = {
             "energies": self._energies,
             "acceleration_along": lambda: _along(self._one("acceleration"), ("q", "v")),
@@ -106,8 +102,7 @@ class _Tables:
                 "constraint_rates", ("parameters", "q", "v"), ("d_g_dot", "d_g_ddot")
             )
         # The factors of larger matrices, which series keep, have no derivative here.
-        if series and len(self._kernel.system.coordinates) <= UNROLLED:
-            start, following = series_functions(series)
+        if len(self._kernel.system.coordinates) <= UNROLLED:
             composed["series_start_along"] = lambda: _along(start, ("parameters", "inputs", "state"))
             composed["series_next_along"] = lambda: _along(following, ("state", "kept", "sums"))
 
@@ -119,14 +114,12 @@ class _Tables:
         names = self._recorder.names
         return KernelTable([*map(of, OF_MANY)], [*map(of, PLAIN)], series, names, self._rows(series))
 
-    def _rows(self, series: SeriesTapes | None) -> dict[str, int]:
+    def _rows(self, series: SeriesTapes) -> dict[str, int]:
         system = self._kernel.system
         n = len(system.coordinates)
         sizes = {"parameters": len(system.parameters), "times": 1, "inputs": len(system.inputs)}
         sizes |= dict.fromkeys(("q", "v", "a", "p"), n)
-        if series:
-            sizes |= {"unit": 1, "order": 4, "state": 2 * n}
-            sizes |= {"kept": series.kept, "sums": len(series.series.sums)}
+        sizes |= {"unit": 1, "order": 4, "state": 2 * n, "kept": series.kept, "sums": len(series.series.sums)}
         return sizes | {_slope_of(array): size for array, size in sizes.items()}
 
     # --- functions
@@ -154,10 +147,8 @@ class _Tables:
         return replace(whole, takes=takes, gives=gives, tape=whole.tape.give(outputs))
 
 
-def series_functions(tapes: SeriesTapes | None) -> tuple[TableFunction, ...]:
-    """The tapes of a kernel's series as functions, if it has some; series_tape.py describes their arrays."""
-    if tapes is None:
-        return ()
+def series_functions(tapes: SeriesTapes) -> tuple[TableFunction, TableFunction]:
+    """The tapes of a kernel's series as functions; series_tape.py describes their arrays."""
     return (
         TableFunction("series_start", ("unit", "state"), ("next", "kept"), tapes.start),
         TableFunction("series_next", ("order", "state", "kept", "sums"), ("next", "operands"), tapes.next),

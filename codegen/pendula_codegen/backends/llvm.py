@@ -46,8 +46,7 @@ def print_kernel(table: KernelTable, size: int, description: Sequence[str], inst
             seldom = states in SELDOM.get(function.name, ())
             parts.append(_by_eight(table, function, states) if seldom else _function(function, states, width))
         parts.append(_iteration(of_many[0], states, width, size))
-        if table.series_or_none:
-            parts += [series_start(table, states, width), series_next(table, states, width, most)]
+        parts += [series_start(table, states, width), series_next(table, states, width, most)]
     parts += [_function(function, 1, 1) for function in filter(None, plain)]
     target = f' "target-cpu"="x86-64" "target-features"="{features}"' if features else ""
     parts += [*_tables(table, description), f"attributes #0 = {{ nounwind{target} }}"]
@@ -69,17 +68,13 @@ def _tables(table: KernelTable, description: Sequence[str]) -> list[str]:
             f"@{name} = internal constant [{len(entries) + len(more)} x ptr] [{', '.join([*entries, *more])}]"
         )
 
-    def more(states: int) -> list[str]:
-        moved = [f"ptr @{name}_{states}" if table.series_or_none else "ptr null" for name in series]
-        return [f"ptr @iterate_{states}", *moved]
-
     text = "".join(f"{line}\n" for line in description).encode() + b"\0"
     written = "".join(chr(c) if 32 <= c < 127 and c not in b'"\\' else f"\\{c:02X}" for c in text)
     functions = ", ".join(f"ptr @functions_{states}" for states in WIDTHS)
-    series = ("series_start", "series_next")
+    more = ("iterate", "series_start", "series_next")
     kinds = f"{{ i32, ptr, [{len(WIDTHS)} x ptr], ptr }}"
     return [
-        *(list_of(f"functions_{n}", table.of_many, n, more(n)) for n in WIDTHS),
+        *(list_of(f"functions_{n}", table.of_many, n, [f"ptr @{name}_{n}" for name in more]) for n in WIDTHS),
         list_of("plain_functions", table.plain, 1, []),
         f'@description = internal constant [{len(text)} x i8] c"{written}"',
         f"@pendula_kernel = constant {kinds} {{ i32 {INTERFACE}, ptr @description, "

@@ -316,19 +316,16 @@ class OwnedKernel {
   static bool is_of_tangents(std::size_t which) {
     return which == Program::series_start_along || which == Program::series_next_along;
   }
-  static bool is_of_series(std::size_t which) { return which >= Program::series_start || is_of_tangents(which); }
 
-  /// Requires every function, except those of tangents along series, which models of many coordinates lack, all of
-  /// series, which models with constraints lack, and those that return something the model does not have; these must be
-  /// missing.
+  /// Requires every function, except those of tangents along series, which models of many coordinates lack, and those
+  /// that return something the model does not have; these must be missing.
   void require_all(const KernelText& lines) {
     const SystemInfo& info = table_.info;
     for (std::size_t k = 0; k < signatures.size(); ++k) {
       const Signature& signature = signatures[k];
-      const bool has_it = info.constraints.empty() || !is_of_series(k);
-      const bool wanted = has_it && count(signature.arrays[signature.taken].rows, info) > 0;
+      const bool wanted = count(signature.arrays[signature.taken].rows, info) > 0;
       const bool there = !program_.functions[k].code.empty();
-      if (has_it && is_of_tangents(k) && !there) continue;
+      if (is_of_tangents(k) && !there) continue;
       if (wanted != there) lines.fail((wanted ? "" : "no ") + std::string(signature.name), wanted ? "none" : "one");
     }
     const bool lacks_tangents = program_.functions[Program::series_start_along].code.empty() ||
@@ -336,10 +333,7 @@ class OwnedKernel {
     for (SystemFunctions* of : {&table_.of_1, &table_.of_2, &table_.of_4, &table_.of_8}) {
       if (lacks_tangents) of->series_start_along = nullptr, of->series_next_along = nullptr;
       if (info.argument_is_base.empty()) of->call_arguments = nullptr;
-      if (!info.constraints.empty()) {
-        of->series_start = nullptr, of->series_next = nullptr;
-        continue;
-      }
+      if (!info.constraints.empty()) continue;
       of->constraints = nullptr, of->constraint_rates = nullptr, of->constraint_rate_slopes = nullptr;
       of->constraints_along = nullptr, of->constraint_rates_along = nullptr;
     }
