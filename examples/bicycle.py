@@ -2,6 +2,7 @@
 wheel that rolls on the floor, meet at the steer axis. Nobody holds the bars."""
 
 from itertools import pairwise
+from math import pi
 
 from sympy import Matrix, cos, rot_axis1, rot_axis2, rot_axis3, sin
 
@@ -9,7 +10,7 @@ from sympy import Matrix, cos, rot_axis1, rot_axis2, rot_axis3, sin
 def define(model, links):
     wheelbase = model.parameter("wheelbase", "m", default=1.02)
     trail = model.parameter("trail", "m", default=0.08)
-    tilt = model.parameter("tilt", "rad", default=0.3141592653589793)  # of the steer axis, back from upright
+    tilt = model.parameter("tilt", "rad", default=pi / 10)  # of the steer axis, back from upright
     g = model.parameter("gravity", "m/s^2", default=9.81)
     rate = model.rate
 
@@ -18,12 +19,13 @@ def define(model, links):
         (xx, yy, zz, xz); radius, mass and moments (of a diameter, of the axle) of the wheel."""
 
         def __init__(self, name, m, centre, J, r, m_wheel, J_wheel):
-            # Up to a yaw of the whole, the wheel stands upright and heads along x before it leans to the right.
+            # Turned by yaw about z, which is up, by lean about the way ahead, and by pitch about the axle.
             lean, yaw, pitch, turn = (
                 model.coordinate(f"{name}_{a}", "rad") for a in ("lean", "yaw", "pitch", "turn")
             )
             x, y, z = (model.coordinate(f"{name}_{axis}", "m") for axis in "xyz")
             self.hub, self.axes = Matrix([x, y, z]), (rot_axis2(pitch) * rot_axis1(lean) * rot_axis3(yaw)).T
+            # How fast it turns, besides lean: about the spoke from below, and about the axle.
             up, aside = rate(yaw) * cos(lean), rate(yaw) * sin(lean) + rate(pitch)
             spins = Matrix(
                 [rate(lean) * cos(pitch) - up * sin(pitch), aside, rate(lean) * sin(pitch) + up * cos(pitch)]
@@ -54,7 +56,7 @@ def define(model, links):
     front = Frame("front", 4.0, (-0.12, 0.35), (0.05892, 0.06, 0.00708, 0.00756), 0.35, 3.0, (0.1405, 0.28))
     model.lagrangian = rear.kinetic - rear.potential + front.kinetic - front.potential
 
-    gap = rear.place(wheelbase + trail, -0.3) - front.place(trail, -0.35)
+    gap = rear.place(wheelbase + trail, -rear.radius) - front.place(trail, -front.radius)
     for axis, apart in zip("xyz", gap, strict=True):
         model.constraint(f"steer_{axis}", apart, "m")
     steer = rear.axes * Matrix([-sin(tilt), 0, cos(tilt)])

@@ -81,7 +81,7 @@ class Tape:
     def read(self, row: Row) -> Value:
         return self._add("read", row=row)
 
-    # What is known of numbers is a number: C has no packs of what only numbers make.
+    # What only numbers go into is computed here. In C it would be one double, where packs are expected.
 
     def add(self, x: Value, y: Value) -> Value:
         if x in self._numbers and y in self._numbers:

@@ -7,9 +7,7 @@ from typing import Any
 import numpy as np
 import pendula
 import pytest
-from numpy.typing import NDArray
-
-Numbers = NDArray[np.float64]
+from test_linkage_derivatives import Numbers, accelerations, difference
 
 
 @pendula.model
@@ -104,11 +102,6 @@ CASES = {
 every_case = pytest.mark.parametrize("case", CASES.values(), ids=CASES)
 
 
-def difference(moved: Callable[[float], Numbers], h: float) -> Numbers:
-    """Its derivative at 0, with an error of order h^4."""
-    return (8 * (moved(h) - moved(-h)) - (moved(2 * h) - moved(-2 * h))) / (12 * h)
-
-
 def begun_and_ended(simulation: pendula.Simulation) -> Numbers:
     return np.array([simulation.state, simulation.advance_to(0.5).state])
 
@@ -135,11 +128,6 @@ def test_derivatives_are_those_of_the_steps(case: Case) -> None:
         assert np.allclose(found, end, rtol=0, atol=1e-9), name  # measured up to 2.8e-11
     pushed = difference(lambda h: begun_and_ended(case.begin(push=h)), 1e-3)[1]
     assert np.allclose(moved.by_inputs["push"][0, :, 0], pushed, rtol=0, atol=1e-8)  # measured up to 1.2e-10
-
-
-def accelerations(simulation: pendula.Simulation) -> Numbers:
-    field = pendula._core.field(simulation._made, simulation.time, simulation.state)
-    return np.array(field[len(field) // 2 :])
 
 
 @every_case

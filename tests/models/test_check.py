@@ -11,7 +11,7 @@ from test_forcing import MODEL as FORCED
 from test_forcing import SHARP
 
 SYSTEMS = sorted(file for file in EXAMPLES.glob("*.toml") if "[system]" in file.read_text())
-# Joints between bars, by numbers alone: some products are of nothing else.
+# Bars between joints, without a parameter: some products in its kernel are of two numbers.
 NUMBERS = """
 def define(model, links):
     fixed, joints = [(0, 0), (1, 0), (2, 0)], [[model.coordinate(f"{a}_{k}", "m") for a in "xy"] for k in range(3)]
